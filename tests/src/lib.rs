@@ -1,0 +1,98 @@
+//! Helpers of the whole-program tests: where the shared data is, and the `vice` program itself.
+//!
+//! Cargo does not build another package's program for a test, so [`vice`] builds it once, in the profile and target
+//! folder that the test itself was built in.
+#![allow(clippy::expect_used, clippy::panic, clippy::print_stderr)] // A test helper fails its test.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+/// The workspace's root.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the package lies in the workspace")
+}
+
+/// A file or folder of the shared data (`VICE_SHARED`, by default `../shared`).
+///
+/// Where it is missing this prints the reason and gives `None`, so that the test is skipped; with
+/// `VICE_REQUIRE_DATA=1` it fails instead.
+pub fn shared(relative: &str) -> Option<PathBuf> {
+    let base = std::env::var_os("VICE_SHARED").map_or_else(|| PathBuf::from("../shared"), PathBuf::from);
+    let path = root().join(base).join(relative);
+    if path.exists() {
+        return Some(path);
+    }
+    let reason =
+        format!("skipped: {} is missing (set VICE_SHARED to the folder of shared data)", path.display());
+    if std::env::var("VICE_REQUIRE_DATA").is_ok_and(|v| v == "1") {
+        panic!("{reason}");
+    }
+    eprintln!("{reason}");
+    None
+}
+
+/// A JSON file of the shared data; see [`shared`].
+pub fn shared_json(relative: &str) -> Option<serde_json::Value> {
+    let path = shared(relative)?;
+    let text = std::fs::read_to_string(&path).expect("the oracle can be read");
+    Some(serde_json::from_str(&text).expect("the oracle is JSON"))
+}
+
+/// Builds a package of the workspace once more, in this test's own profile, and gives the folder its artefacts are in.
+pub fn build(package: &str) -> PathBuf {
+    let test_program = std::env::current_exe().expect("a test knows where it is");
+    // target/<profile>/deps/<test>
+    let folder =
+        test_program.ancestors().nth(2).expect("the test lies in target/<profile>/deps").to_path_buf();
+    let profile = match folder.file_name().and_then(|n| n.to_str()).expect("a profile has a name") {
+        "debug" => "dev",
+        name => name,
+    };
+    let target = folder.parent().expect("a profile lies in the target folder");
+    let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        .current_dir(root())
+        .args(["build", "--quiet", "--locked", "--package", package, "--profile", profile, "--target-dir"])
+        .arg(target)
+        .status()
+        .expect("cargo can be run");
+    assert!(status.success(), "building {package} failed");
+    folder
+}
+
+/// The `vice` program, built once.
+pub fn vice_program() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| build("vice-cli").join(format!("vice{}", std::env::consts::EXE_SUFFIX)))
+}
+
+/// What a run of `vice` gave.
+#[derive(Debug)]
+pub struct Run {
+    /// Exit code; -1 where a signal ended it.
+    pub code: i32,
+    /// Standard output.
+    pub stdout: String,
+    /// Standard error.
+    pub stderr: String,
+}
+
+impl From<Output> for Run {
+    fn from(output: Output) -> Self {
+        Self {
+            code: output.status.code().unwrap_or(-1),
+            stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
+            stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
+        }
+    }
+}
+
+/// Runs `vice` in a folder.
+pub fn vice_in<I: AsRef<std::ffi::OsStr>>(folder: &Path, args: &[I]) -> Run {
+    Command::new(vice_program()).current_dir(folder).args(args).output().expect("vice can be run").into()
+}
+
+/// Runs `vice` in the workspace's root.
+pub fn vice<I: AsRef<std::ffi::OsStr>>(args: &[I]) -> Run {
+    vice_in(root(), args)
+}

@@ -1,0 +1,4 @@
+//! Everything that is tested through the program or against the oracles, in one test program: it links once.
+#![allow(missing_docs)]
+
+mod camera_oracle;

@@ -1,0 +1,340 @@
+//! Cameras: from a point in front of the lens to a pixel and back.
+//!
+//! A point `(X, Y, Z)` in the camera frame (x right, y down, z forward) has the normalised coordinates
+//! `x = X/Z, y = Y/Z`. The lens moves them ([`Model`]), the intrinsics scale and shift them:
+//! `u = fx x' + cx, v = fy y' + cy`. Pixel centres are integers; (0, 0) is the centre of the top left pixel.
+//!
+//! | model | coefficients | known as |
+//! | --- | --- | --- |
+//! | [`Model::Pinhole`] | none | |
+//! | [`Model::Radtan`] | k1 k2 p1 p2 \[k3\] | Brown-Conrady, EuRoC `radial-tangential`, ROS `plumb_bob` |
+//! | [`Model::Rational`] | k1 k2 p1 p2 k3 k4 k5 k6 | the paper's model, ROS `rational_polynomial` |
+//! | [`Model::Equidistant`] | k1 k2 k3 k4 | Kannala-Brandt, OpenCV `fisheye` |
+//!
+//! A distortion polynomial fitted inside the image may fold back outside it, so that points far to the side land
+//! in the picture again. The radius where it stops growing is found once, when the camera is built, and nothing
+//! beyond it projects. The inverse is Newton's method with the analytic Jacobian: solved to
+//! [`UNPROJECT_TOLERANCE`] or an error.
+
+mod batch;
+mod equidistant;
+mod poly;
+mod radtan;
+mod rational;
+mod solve;
+
+use nalgebra::{Point3, Vector3};
+use serde::{Deserialize, Serialize};
+
+pub use equidistant::Equidistant;
+pub use radtan::Radtan;
+pub use rational::Rational;
+
+/// How closely [`Camera::unproject`] solves, in normalised coordinates.
+pub const UNPROJECT_TOLERANCE: f64 = 1e-10;
+
+/// A place in the image, in pixels; pixel centres are integers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(from = "[f64; 2]", into = "[f64; 2]")]
+pub struct Pixel {
+    /// To the right.
+    pub u: f64,
+    /// Downwards.
+    pub v: f64,
+}
+
+impl Pixel {
+    /// A place in the image.
+    pub const fn new(u: f64, v: f64) -> Self {
+        Self { u, v }
+    }
+
+    /// Euclidean distance in pixels.
+    pub fn distance_px(self, other: Self) -> f64 {
+        (self.u - other.u).hypot(self.v - other.v)
+    }
+}
+
+impl From<[f64; 2]> for Pixel {
+    fn from([u, v]: [f64; 2]) -> Self {
+        Self { u, v }
+    }
+}
+
+impl From<Pixel> for [f64; 2] {
+    fn from(p: Pixel) -> Self {
+        [p.u, p.v]
+    }
+}
+
+/// The lens: what happens to normalised coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Model {
+    /// Nothing happens.
+    Pinhole,
+    /// Radial and tangential polynomial.
+    Radtan(Radtan),
+    /// Radial quotient of polynomials, and tangential.
+    Rational(Rational),
+    /// Polynomial in the angle off the axis.
+    Equidistant(Equidistant),
+}
+
+/// A lens as seen by the solvers: where a normalised point goes, and how that changes.
+pub(crate) trait Distortion {
+    /// Distorted coordinates of normalised `(x, y)`.
+    fn distort(&self, x: f64, y: f64) -> (f64, f64);
+    /// The same, with the Jacobian `[dx'/dx, dx'/dy, dy'/dx, dy'/dy]`.
+    fn distort_with_jacobian(&self, x: f64, y: f64) -> ((f64, f64), [f64; 4]);
+    /// Undistorted radius up to which the radial part grows; infinity where it always does.
+    fn max_radius(&self) -> f64;
+    /// Distorted radius of an undistorted one, without the tangential part.
+    fn radial(&self, r: f64) -> f64;
+}
+
+/// Why numbers are no camera.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CameraError {
+    /// A number is NaN or infinite.
+    #[error("camera {0} is not finite")]
+    NotFinite(&'static str),
+    /// A focal length is zero or negative.
+    #[error("focal length {name} = {value} is not positive")]
+    FocalLength {
+        /// `fx` or `fy`.
+        name: &'static str,
+        /// The value given, pixels.
+        value: f64,
+    },
+    /// The image has no pixels.
+    #[error("image size {width}x{height} is empty")]
+    EmptyImage {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// The model's name is not known.
+    #[error(
+        "unknown camera model `{0}`; known: pinhole, radtan (radial-tangential, plumb_bob), rational (rational_polynomial), equidistant (fisheye, kannala_brandt)"
+    )]
+    UnknownModel(String),
+    /// The model has another number of coefficients.
+    #[error("model {model} takes {expected} distortion coefficients, got {got}")]
+    CoefficientCount {
+        /// Name of the model.
+        model: &'static str,
+        /// How many it takes.
+        expected: &'static str,
+        /// How many there were.
+        got: usize,
+    },
+}
+
+/// Why a point has no pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProjectError {
+    /// The point is on or behind the plane of the camera (Z <= 0), or not a number.
+    #[error("the point is not in front of the camera")]
+    BehindCamera,
+    /// The point is so far to the side that the distortion model folds back.
+    #[error("the point is outside the radius in which the distortion model is valid")]
+    OutsideModel,
+}
+
+/// Why a pixel has no ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum UnprojectError {
+    /// No ray within the valid radius of the distortion model reaches this pixel.
+    #[error("no ray within the valid radius of the distortion model reaches the pixel")]
+    OutsideModel,
+    /// Newton's method did not converge.
+    #[error("undistortion did not converge to 1e-10")]
+    NotConverged,
+}
+
+/// A calibrated camera: image size in pixels, intrinsics in pixels, and a lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    width: u32,
+    height: u32,
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    model: Model,
+    max_radius: f64,
+}
+
+impl Model {
+    /// A model by the names that calibrations use, with its coefficients.
+    ///
+    /// # Errors
+    /// [`CameraError`] for an unknown name, a wrong number of coefficients or one that is not finite.
+    pub fn from_name(name: &str, coefficients: &[f64]) -> Result<Self, CameraError> {
+        if !coefficients.iter().all(|c| c.is_finite()) {
+            return Err(CameraError::NotFinite("distortion coefficient"));
+        }
+        let got = coefficients.len();
+        let count = |model, expected| CameraError::CoefficientCount { model, expected, got };
+        match name.trim().to_ascii_lowercase().as_str() {
+            "pinhole" | "none" | "" => match coefficients.iter().all(|c| *c == 0.0) {
+                true => Ok(Self::Pinhole),
+                false => Err(count("pinhole", "no")),
+            },
+            "radtan" | "radial-tangential" | "plumb_bob" | "brown_conrady" => match *coefficients {
+                [k1, k2, p1, p2] => Ok(Self::Radtan(Radtan { k1, k2, p1, p2, k3: 0.0 })),
+                [k1, k2, p1, p2, k3] => Ok(Self::Radtan(Radtan { k1, k2, p1, p2, k3 })),
+                _ => Err(count("radtan", "4 or 5")),
+            },
+            "rational" | "rational_polynomial" => match *coefficients {
+                [k1, k2, p1, p2, k3, k4, k5, k6] => {
+                    Ok(Self::Rational(Rational { k1, k2, p1, p2, k3, k4, k5, k6 }))
+                }
+                _ => Err(count("rational", "8")),
+            },
+            "equidistant" | "fisheye" | "kannala_brandt" => match *coefficients {
+                [k1, k2, k3, k4] => Ok(Self::Equidistant(Equidistant { k1, k2, k3, k4 })),
+                _ => Err(count("equidistant", "4")),
+            },
+            _ => Err(CameraError::UnknownModel(name.to_string())),
+        }
+    }
+
+    /// The name VICE writes.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Pinhole => "pinhole",
+            Self::Radtan(_) => "radtan",
+            Self::Rational(_) => "rational",
+            Self::Equidistant(_) => "equidistant",
+        }
+    }
+
+    /// The coefficients in the order of [`Model::from_name`].
+    pub fn coefficients(&self) -> Vec<f64> {
+        match *self {
+            Self::Pinhole => vec![],
+            Self::Radtan(Radtan { k1, k2, p1, p2, k3 }) => vec![k1, k2, p1, p2, k3],
+            Self::Rational(Rational { k1, k2, p1, p2, k3, k4, k5, k6 }) => {
+                vec![k1, k2, p1, p2, k3, k4, k5, k6]
+            }
+            Self::Equidistant(Equidistant { k1, k2, k3, k4 }) => vec![k1, k2, k3, k4],
+        }
+    }
+}
+
+impl Camera {
+    /// A camera from its image size, `[fx, fy, cx, cy]` in pixels, and its lens.
+    ///
+    /// # Errors
+    /// [`CameraError`] for an empty image, numbers that are not finite, or a focal length that is not positive.
+    pub fn new(width: u32, height: u32, fx_fy_cx_cy: [f64; 4], model: Model) -> Result<Self, CameraError> {
+        if width == 0 || height == 0 {
+            return Err(CameraError::EmptyImage { width, height });
+        }
+        let [fx, fy, cx, cy] = fx_fy_cx_cy;
+        for (name, value) in [("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)] {
+            if !value.is_finite() {
+                return Err(CameraError::NotFinite(name));
+            }
+        }
+        for (name, value) in [("fx", fx), ("fy", fy)] {
+            if value <= 0.0 {
+                return Err(CameraError::FocalLength { name, value });
+            }
+        }
+        if !model.coefficients().iter().all(|c| c.is_finite()) {
+            return Err(CameraError::NotFinite("distortion coefficient"));
+        }
+        let max_radius = match &model {
+            Model::Pinhole => f64::INFINITY,
+            Model::Radtan(m) => m.max_radius(),
+            Model::Rational(m) => m.max_radius(),
+            Model::Equidistant(m) => m.max_radius(),
+        };
+        Ok(Self { width, height, fx, fy, cx, cy, model, max_radius })
+    }
+
+    /// Columns.
+    pub const fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Rows.
+    pub const fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// `[fx, fy, cx, cy]` in pixels.
+    pub const fn fx_fy_cx_cy(&self) -> [f64; 4] {
+        [self.fx, self.fy, self.cx, self.cy]
+    }
+
+    /// The lens.
+    pub const fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The normalised radius `√(x²+y²)` beyond which nothing projects; infinity where the model never folds back.
+    pub const fn max_radius(&self) -> f64 {
+        self.max_radius
+    }
+
+    /// Whether the place lies on a pixel of the image: `[-0.5, width - 0.5)` by `[-0.5, height - 0.5)`.
+    pub fn contains(&self, px: Pixel) -> bool {
+        px.u >= -0.5
+            && px.v >= -0.5
+            && px.u < f64::from(self.width) - 0.5
+            && px.v < f64::from(self.height) - 0.5
+    }
+
+    /// The pixel of a point in the camera frame (metres). It may lie outside the image: see [`Camera::contains`].
+    ///
+    /// # Errors
+    /// [`ProjectError`] if the point is not in front of the camera or beyond the model's valid radius.
+    pub fn project(&self, point: &Point3<f64>) -> Result<Pixel, ProjectError> {
+        if point.z <= 0.0 || point.z.is_nan() {
+            return Err(ProjectError::BehindCamera);
+        }
+        let (x, y) = (point.x / point.z, point.y / point.z);
+        let r2 = x * x + y * y;
+        if r2.is_nan() {
+            return Err(ProjectError::BehindCamera);
+        }
+        if r2 > self.max_radius * self.max_radius || r2.is_infinite() {
+            return Err(ProjectError::OutsideModel);
+        }
+        let (xd, yd) = match &self.model {
+            Model::Pinhole => (x, y),
+            Model::Radtan(m) => m.distort(x, y),
+            Model::Rational(m) => m.distort(x, y),
+            Model::Equidistant(m) => m.distort(x, y),
+        };
+        Ok(Pixel::new(self.fx * xd + self.cx, self.fy * yd + self.cy))
+    }
+
+    /// The ray of a pixel: the point `(x, y, 1)` of the camera frame that projects to it.
+    ///
+    /// # Errors
+    /// [`UnprojectError`] if no ray within the valid radius reaches the pixel or the solver does not converge.
+    pub fn unproject(&self, px: Pixel) -> Result<Vector3<f64>, UnprojectError> {
+        let (xd, yd) = ((px.u - self.cx) / self.fx, (px.v - self.cy) / self.fy);
+        if !(xd.is_finite() && yd.is_finite()) {
+            return Err(UnprojectError::OutsideModel);
+        }
+        let (x, y) = match &self.model {
+            Model::Pinhole => (xd, yd),
+            Model::Radtan(m) => solve::undistort(m, self.max_radius, xd, yd)?,
+            Model::Rational(m) => solve::undistort(m, self.max_radius, xd, yd)?,
+            Model::Equidistant(m) => solve::undistort(m, self.max_radius, xd, yd)?,
+        };
+        Ok(Vector3::new(x, y, 1.0))
+    }
+}
+
+#[cfg(test)]
+mod tests;

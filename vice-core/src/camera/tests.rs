@@ -1,0 +1,131 @@
+use proptest::prelude::*;
+
+use super::*;
+
+fn lenses() -> Vec<(&'static str, Camera)> {
+    let radtan = [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05];
+    let plumb = [0.12, -0.25, 0.0009, -0.0005, 0.09];
+    let rational = [0.35, 0.12, 0.0004, -0.0007, 0.01, 0.62, 0.2, 0.02];
+    let fisheye = [0.0034823894, 0.00071503484, -0.0020532361, 0.00020293673];
+    let camera =
+        |name, k, c: &[f64]| (name, Camera::new(752, 480, k, Model::from_name(name, c).unwrap()).unwrap());
+    vec![
+        camera("pinhole", [665.1, 665.1, 511.5, 383.5], &[]),
+        camera("radtan", [458.654, 457.296, 367.215, 248.375], &radtan),
+        camera("plumb_bob", [619.9, 620.11, 320.65, 241.11], &plumb),
+        camera("rational", [610.0, 611.5, 322.0, 243.0], &rational),
+        camera("equidistant", [190.98, 190.97, 254.93, 256.9], &fisheye),
+    ]
+}
+
+proptest! {
+    #[test]
+    fn a_pixel_unprojects_to_its_point(x in -0.9..0.9_f64, y in -0.9..0.9_f64, z in 0.05..50.0_f64) {
+        for (name, camera) in lenses() {
+            let point = Point3::new(x * z, y * z, z);
+            if x.hypot(y) > 0.98 * camera.max_radius() {
+                continue;
+            }
+            let px = camera.project(&point).unwrap();
+            let ray = camera.unproject(px).unwrap();
+            prop_assert!((ray - Vector3::new(x, y, 1.0)).norm() < 1e-9, "{name}: {ray}");
+        }
+    }
+
+    #[test]
+    fn a_point_projects_to_its_pixel(u in 0.0..752.0_f64, v in 0.0..480.0_f64) {
+        for (name, camera) in lenses() {
+            if let Ok(ray) = camera.unproject(Pixel::new(u, v)) {
+                let px = camera.project(&Point3::from(ray * 3.0)).unwrap();
+                prop_assert!(px.distance_px(Pixel::new(u, v)) < 1e-7, "{name}: {px:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_jacobian_is_the_slope(x in -0.8..0.8_f64, y in -0.8..0.8_f64) {
+        for (name, camera) in lenses() {
+            let lens: &dyn Distortion = match &camera.model {
+                Model::Pinhole => continue,
+                Model::Radtan(m) => m,
+                Model::Rational(m) => m,
+                Model::Equidistant(m) => m,
+            };
+            let h = 1e-6;
+            let (at, [a, b, c, d]) = lens.distort_with_jacobian(x, y);
+            prop_assert_eq!(at, lens.distort(x, y));
+            let slope = |p: (f64, f64), m: (f64, f64)| ((p.0 - m.0) / (2.0 * h), (p.1 - m.1) / (2.0 * h));
+            let dx = slope(lens.distort(x + h, y), lens.distort(x - h, y));
+            let dy = slope(lens.distort(x, y + h), lens.distort(x, y - h));
+            for (got, want) in [(a, dx.0), (c, dx.1), (b, dy.0), (d, dy.1)] {
+                prop_assert!((got - want).abs() < 1e-7, "{}: {} {}", name, got, want);
+            }
+        }
+    }
+
+    #[test]
+    fn batches_equal_single_points(points in prop::collection::vec((-2.0..2.0_f64, -2.0..2.0_f64, -1.0..3.0_f64), 0..50)) {
+        for (_, camera) in lenses() {
+            let axis = |f: fn(&(f64, f64, f64)) -> f64| points.iter().map(f).collect::<Vec<_>>();
+            let (x, y, z) = (axis(|p| p.0), axis(|p| p.1), axis(|p| p.2));
+            let n = points.len();
+            let (mut u, mut v, mut valid) = (vec![0.0; n], vec![0.0; n], vec![false; n]);
+            let count = camera.project_batch([&x, &y, &z], [&mut u, &mut v], &mut valid);
+            prop_assert_eq!(count, valid.iter().filter(|ok| **ok).count());
+            for i in 0..n {
+                match camera.project(&Point3::new(x[i], y[i], z[i])) {
+                    Ok(px) => prop_assert!(valid[i] && px == Pixel::new(u[i], v[i])),
+                    Err(_) => prop_assert!(!valid[i] && u[i].is_nan()),
+                }
+            }
+            let (mut rx, mut ry, mut ok) = (vec![0.0; n], vec![0.0; n], vec![false; n]);
+            camera.unproject_batch([&u, &v], [&mut rx, &mut ry], &mut ok);
+            for i in 0..n {
+                let single = camera.unproject(Pixel::new(u[i], v[i]));
+                prop_assert_eq!(ok[i], single.is_ok());
+                if let Ok(ray) = single {
+                    prop_assert_eq!((ray.x, ray.y), (rx[i], ry[i]));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn points_behind_or_beyond_the_fold_do_not_project() {
+    // r (1 - 0.3 r²) grows up to r = 1/sqrt(0.9).
+    let model = Model::from_name("radtan", &[-0.3, 0.0, 0.0, 0.0]).unwrap();
+    let camera = Camera::new(640, 480, [400.0, 400.0, 320.0, 240.0], model).unwrap();
+    let rim = (1.0_f64 / 0.9).sqrt();
+    assert!((camera.max_radius() - rim).abs() < 1e-12);
+    assert_eq!(camera.project(&Point3::new(1.0, 0.0, 0.0)), Err(ProjectError::BehindCamera));
+    assert_eq!(camera.project(&Point3::new(1.0, 0.0, -1.0)), Err(ProjectError::BehindCamera));
+    assert_eq!(camera.project(&Point3::new(f64::NAN, 0.0, 1.0)), Err(ProjectError::BehindCamera));
+    assert_eq!(camera.project(&Point3::new(0.0, 0.0, f64::NAN)), Err(ProjectError::BehindCamera));
+    assert_eq!(camera.project(&Point3::new(rim * 1.001, 0.0, 1.0)), Err(ProjectError::OutsideModel));
+    assert!(camera.project(&Point3::new(rim * 0.999, 0.0, 1.0)).is_ok());
+    // The largest distorted radius is 2/3 of the rim: no ray reaches beyond.
+    let edge = rim * 2.0 / 3.0;
+    assert!(camera.unproject(Pixel::new(320.0 + 400.0 * (edge + 1e-3), 240.0)).is_err());
+    let ray = camera.unproject(Pixel::new(320.0 + 400.0 * (edge - 1e-3), 240.0)).unwrap();
+    assert!(ray.x < rim);
+    assert!(camera.unproject(Pixel::new(f64::NAN, 0.0)).is_err());
+}
+
+#[test]
+fn a_rational_pole_bounds_the_radius() {
+    let model = Model::from_name("rational", &[0.0, 0.0, 0.0, 0.0, 0.0, -0.5, 0.0, 0.0]).unwrap();
+    let camera = Camera::new(640, 480, [400.0, 400.0, 320.0, 240.0], model).unwrap();
+    assert!(camera.max_radius() < 2.0_f64.sqrt() && camera.max_radius() > 1.41);
+}
+
+#[test]
+fn bad_calibrations_are_named() {
+    let k = [400.0, 400.0, 320.0, 240.0];
+    assert!(matches!(Camera::new(0, 480, k, Model::Pinhole), Err(CameraError::EmptyImage { .. })));
+    let negative = Camera::new(640, 480, [400.0, -1.0, 0.0, 0.0], Model::Pinhole);
+    assert_eq!(negative.unwrap_err().to_string(), "focal length fy = -1 is not positive");
+    assert!(matches!(Model::from_name("omni", &[]), Err(CameraError::UnknownModel(_))));
+    assert!(matches!(Model::from_name("radtan", &[1.0]), Err(CameraError::CoefficientCount { .. })));
+    assert!(matches!(Model::from_name("radtan", &[f64::NAN; 4]), Err(CameraError::NotFinite(_))));
+}

@@ -1,0 +1,102 @@
+//! Depth sources: how far along the optical axis the scene is at a pixel of a key frame.
+
+use serde::{Deserialize, Serialize};
+
+use crate::camera::{Camera, Pixel};
+use crate::dataset::Floor;
+use crate::error::DataResult;
+use crate::frames::{BodyFromCamera, WorldFromCamera};
+use crate::time::Stamp;
+
+/// A key frame as a depth source sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Keyframe<'a> {
+    /// When.
+    pub stamp: Stamp,
+    /// Index of the frame among the camera's frames.
+    pub frame: usize,
+    /// Intrinsics.
+    pub camera: &'a Camera,
+    /// Extrinsics at that stamp.
+    pub body_from_camera: BodyFromCamera,
+    /// The camera's place in the world by the anchor; `None` where the anchor has no pose at that stamp.
+    pub world_from_camera: Option<WorldFromCamera>,
+    /// The floor as it is known at that stamp.
+    pub floor: Floor,
+}
+
+/// A depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DepthSample {
+    /// Metres along the optical axis.
+    pub z_m: f64,
+    /// The neighbourhood straddles a depth edge: scored, and flagged.
+    pub on_edge: bool,
+}
+
+impl DepthSample {
+    /// A depth away from edges.
+    pub const fn new(z_m: f64) -> Self {
+        Self { z_m, on_edge: false }
+    }
+}
+
+/// Why a pixel has no depth.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, thiserror::Error,
+)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum DepthMiss {
+    /// The anchor has no pose at the key frame, and the source needs one.
+    #[error("the anchor has no pose at the key frame")]
+    NoAnchor,
+    /// The ray runs at or above the horizon and never meets the floor in front of the camera.
+    #[error("the ray does not meet the floor in front of the camera")]
+    AboveHorizon,
+    /// The pixel has no ray: the distortion model does not reach it.
+    #[error("the distortion model does not reach the pixel")]
+    OutsideModel,
+    /// The pixel lies outside the depth image or the colour image.
+    #[error("the pixel is outside the image")]
+    OutsideImage,
+    /// No point of the cloud is in view.
+    #[error("no point of the cloud is in view")]
+    EmptyView,
+    /// The pixel lies outside the hull of the projected cloud.
+    #[error("the pixel is outside the hull of the projected cloud")]
+    OutsideHull,
+    /// The triangle around the pixel is too wide to trust.
+    #[error("the triangle of cloud points around the pixel is too wide to trust")]
+    TriangleTooWide,
+    /// The triangle around the pixel spans an occlusion edge.
+    #[error("the triangle of cloud points around the pixel spans an occlusion edge")]
+    OcclusionEdge,
+    /// The depth image has no valid value around the pixel.
+    #[error("the depth image has no valid value at the pixel")]
+    NoDepth,
+    /// The depth is outside the range asked for.
+    #[error("the depth is outside the range asked for")]
+    OutOfRange,
+    /// The ray meets no surface of the mesh.
+    #[error("the ray meets no surface of the mesh")]
+    NoSurface,
+}
+
+/// Something that knows the depth of pixels at key frames.
+pub trait DepthSource: Send + Sync {
+    /// Name in tables and documents: `floor`, `zmap`, `zcam`, `mesh`.
+    fn name(&self) -> &str;
+
+    /// Depths of pixels of one key frame, in their order. Asked once for all pixels of a key frame, since what can be
+    /// shared between them (a projected cloud, a decoded image) is most of the work.
+    ///
+    /// # Errors
+    /// [`crate::error::DataError`] if the data behind the source cannot be read. A pixel without depth is no error but
+    /// a [`DepthMiss`].
+    fn depths(
+        &self,
+        keyframe: &Keyframe<'_>,
+        pixels: &[Pixel],
+    ) -> DataResult<Vec<Result<DepthSample, DepthMiss>>>;
+}

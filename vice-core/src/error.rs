@@ -1,0 +1,127 @@
+//! The error of everything that reads data: what is wrong, where, and what to do about it.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// A place inside a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Place {
+    /// A line, counted from 1.
+    Line(u64),
+    /// A byte offset, counted from 0.
+    Byte(u64),
+}
+
+/// Data that cannot be used. Shown as one line: `path:line: problem (hint)`, then its cause.
+#[derive(Debug)]
+pub struct DataError {
+    path: Option<PathBuf>,
+    place: Option<Place>,
+    problem: String,
+    hint: Option<String>,
+    source: Option<Box<dyn std::error::Error + Send + Sync>>,
+}
+
+/// The result of reading data.
+pub type DataResult<T> = Result<T, DataError>;
+
+impl DataError {
+    /// An error that says what is wrong, in words a user understands.
+    pub fn new(problem: impl Into<String>) -> Self {
+        Self { path: None, place: None, problem: problem.into(), hint: None, source: None }
+    }
+
+    /// Adds the file or folder, unless one nearer to the cause is there already.
+    #[must_use]
+    pub fn at(mut self, path: impl AsRef<Path>) -> Self {
+        self.path.get_or_insert_with(|| path.as_ref().to_path_buf());
+        self
+    }
+
+    /// Adds the line, counted from 1.
+    #[must_use]
+    pub fn line(mut self, line: u64) -> Self {
+        self.place.get_or_insert(Place::Line(line));
+        self
+    }
+
+    /// Adds the byte offset, counted from 0.
+    #[must_use]
+    pub fn byte(mut self, byte: u64) -> Self {
+        self.place.get_or_insert(Place::Byte(byte));
+        self
+    }
+
+    /// Adds what the user can do.
+    #[must_use]
+    pub fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = Some(hint.into());
+        self
+    }
+
+    /// Adds the cause.
+    #[must_use]
+    pub fn because(mut self, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+        self.source = Some(source.into());
+        self
+    }
+
+    /// What is wrong, without place and hint.
+    pub fn problem(&self) -> &str {
+        &self.problem
+    }
+
+    /// The file or folder, where known.
+    pub fn path(&self) -> Option<&Path> {
+        self.path.as_deref()
+    }
+
+    /// The place in the file, where known.
+    pub const fn place(&self) -> Option<Place> {
+        self.place
+    }
+}
+
+impl fmt::Display for DataError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(path) = &self.path {
+            write!(f, "{}", path.display())?;
+            match self.place {
+                Some(Place::Line(line)) => write!(f, ":{line}: ")?,
+                Some(Place::Byte(byte)) => write!(f, ": byte {byte}: ")?,
+                None => write!(f, ": ")?,
+            }
+        } else if let Some(place) = self.place {
+            match place {
+                Place::Line(line) => write!(f, "line {line}: ")?,
+                Place::Byte(byte) => write!(f, "byte {byte}: ")?,
+            }
+        }
+        write!(f, "{}", self.problem)?;
+        if let Some(hint) = &self.hint {
+            write!(f, " ({hint})")?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for DataError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        self.source.as_deref().map(|s| s as &(dyn std::error::Error + 'static))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_place_nearest_to_the_cause_wins() {
+        let error =
+            DataError::new("x is NaN").at("poses.csv").line(7).at("folder").line(9).hint("remove the row");
+        assert_eq!(error.to_string(), "poses.csv:7: x is NaN (remove the row)");
+        assert_eq!(DataError::new("cut off").at("a.bag").byte(12).to_string(), "a.bag: byte 12: cut off");
+        assert_eq!(DataError::new("cut off").line(3).to_string(), "line 3: cut off");
+    }
+}

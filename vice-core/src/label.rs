@@ -1,0 +1,315 @@
+//! Labels: where a human, helped by a tracker, says a scene point is.
+//!
+//! A point has observations in time order. An observation marked as a key frame starts a new *segment*: its pixel
+//! is lifted to 3D and carried along by each pose stream until the next key frame (a respawn). The observations after
+//! it are what the streams are scored against.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::camera::Pixel;
+use crate::time::Stamp;
+
+/// Who made an observation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum ObservationSource {
+    /// A human placed it.
+    #[default]
+    Manual,
+    /// An image tracker placed it.
+    Auto,
+    /// A detector of calibration targets placed it.
+    Detected,
+    /// Interpolated between two others.
+    Interpolated,
+}
+
+impl ObservationSource {
+    /// The name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Manual => "manual",
+            Self::Auto => "auto",
+            Self::Detected => "detected",
+            Self::Interpolated => "interpolated",
+        }
+    }
+
+    /// By its name in files.
+    pub fn from_name(name: &str) -> Option<Self> {
+        [Self::Manual, Self::Auto, Self::Detected, Self::Interpolated].into_iter().find(|s| s.name() == name)
+    }
+}
+
+/// One point in one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observation {
+    /// The frame's stamp.
+    pub stamp: Stamp,
+    /// Where the point is.
+    pub px: Pixel,
+    /// Who says so.
+    pub source: ObservationSource,
+    /// Starts a segment.
+    pub keyframe: bool,
+    /// The point is hidden here: not scored.
+    pub occluded: bool,
+    /// The annotator is not sure: scored, and shown as such.
+    pub uncertain: bool,
+    /// The line of the file it came from, counted from 1; 0 where there is none.
+    pub line: u64,
+}
+
+/// A scene point and its observations, strictly ordered in time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointLabels {
+    /// Its name.
+    pub name: String,
+    /// Its observations.
+    pub observations: Vec<Observation>,
+}
+
+/// A key frame and what follows until the next one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment<'a> {
+    /// The key frame.
+    pub keyframe: &'a Observation,
+    /// Observations after it.
+    pub rest: &'a [Observation],
+}
+
+/// All labels of one camera of one run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LabelSet {
+    points: Vec<PointLabels>,
+    /// Name of the data set they belong to, where the file says so.
+    pub dataset: Option<String>,
+    /// Camera they belong to, where the file says so.
+    pub camera: Option<String>,
+}
+
+/// A row as a file has it: not checked yet.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LabelRow {
+    /// Name of the point.
+    pub point: String,
+    /// The observation.
+    pub observation: Observation,
+}
+
+/// Why rows are no labels.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LabelError {
+    /// A pixel is NaN or infinite.
+    #[error("point {point} at {stamp} ns has a pixel that is not finite")]
+    NotFinite {
+        /// The point.
+        point: String,
+        /// The frame.
+        stamp: Stamp,
+        /// Line of the file, 0 where there is none.
+        line: u64,
+    },
+    /// A point is labelled twice in a frame.
+    #[error("point {point} is labelled twice at {stamp} ns")]
+    Duplicate {
+        /// The point.
+        point: String,
+        /// The frame.
+        stamp: Stamp,
+        /// Line of the second one, 0 where there is none.
+        line: u64,
+    },
+    /// A point has no name.
+    #[error("a point at {stamp} ns has an empty name")]
+    NoName {
+        /// The frame.
+        stamp: Stamp,
+        /// Line of the file, 0 where there is none.
+        line: u64,
+    },
+}
+
+impl LabelError {
+    /// Line of the file at fault, where known.
+    pub const fn line(&self) -> Option<u64> {
+        match self {
+            Self::NotFinite { line, .. } | Self::Duplicate { line, .. } | Self::NoName { line, .. } => {
+                if *line == 0 {
+                    None
+                } else {
+                    Some(*line)
+                }
+            }
+        }
+    }
+}
+
+impl Observation {
+    /// A manual observation that carries no marks.
+    pub const fn manual(stamp: Stamp, px: Pixel) -> Self {
+        Self {
+            stamp,
+            px,
+            source: ObservationSource::Manual,
+            keyframe: false,
+            occluded: false,
+            uncertain: false,
+            line: 0,
+        }
+    }
+
+    /// The same observation as a key frame.
+    #[must_use]
+    pub const fn as_keyframe(mut self) -> Self {
+        self.keyframe = true;
+        self
+    }
+}
+
+impl PointLabels {
+    /// The segments in time order. Observations before the first key frame belong to none: see [`PointLabels::before_first_keyframe`].
+    pub fn segments(&self) -> impl Iterator<Item = Segment<'_>> {
+        let starts: Vec<usize> =
+            self.observations.iter().enumerate().filter(|(_, o)| o.keyframe).map(|(i, _)| i).collect();
+        let ends: Vec<usize> = starts.iter().skip(1).copied().chain([self.observations.len()]).collect();
+        starts.into_iter().zip(ends).map(|(start, end)| Segment {
+            keyframe: &self.observations[start],
+            rest: &self.observations[start + 1..end],
+        })
+    }
+
+    /// Observations that no key frame precedes: there is nothing to carry along.
+    pub fn before_first_keyframe(&self) -> &[Observation] {
+        let n = self.observations.iter().position(|o| o.keyframe).unwrap_or(self.observations.len());
+        &self.observations[..n]
+    }
+}
+
+impl LabelSet {
+    /// Labels from rows in any order; points are sorted by name in natural order (2 before 10), observations by stamp.
+    ///
+    /// # Errors
+    /// [`LabelError`] for a pixel that is not finite, an empty name, or a point labelled twice in a frame.
+    pub fn from_rows(rows: impl IntoIterator<Item = LabelRow>) -> Result<Self, LabelError> {
+        let mut points: BTreeMap<NaturalName, Vec<Observation>> = BTreeMap::new();
+        for LabelRow { point, observation } in rows {
+            let (stamp, line) = (observation.stamp, observation.line);
+            if point.is_empty() {
+                return Err(LabelError::NoName { stamp, line });
+            }
+            if !(observation.px.u.is_finite() && observation.px.v.is_finite()) {
+                return Err(LabelError::NotFinite { point, stamp, line });
+            }
+            points.entry(NaturalName::new(point)).or_default().push(observation);
+        }
+        let mut sorted = Vec::with_capacity(points.len());
+        for (name, mut observations) in points {
+            let name = name.text;
+            observations.sort_by_key(|o| (o.stamp, o.line));
+            if let Some(pair) = observations.windows(2).find(|w| w[0].stamp == w[1].stamp) {
+                return Err(LabelError::Duplicate { point: name, stamp: pair[1].stamp, line: pair[1].line });
+            }
+            sorted.push(PointLabels { name, observations });
+        }
+        Ok(Self { points: sorted, dataset: None, camera: None })
+    }
+
+    /// The points, in natural order of their names.
+    pub fn points(&self) -> &[PointLabels] {
+        &self.points
+    }
+
+    /// Keeps only the named points, in the set's order.
+    ///
+    /// # Errors
+    /// The first name that is no point of the set.
+    pub fn select(&self, names: &[String]) -> Result<Self, String> {
+        if let Some(unknown) = names.iter().find(|n| self.points.iter().all(|p| p.name != **n)) {
+            return Err(unknown.clone());
+        }
+        let points = self.points.iter().filter(|p| names.contains(&p.name)).cloned().collect();
+        Ok(Self { points, dataset: self.dataset.clone(), camera: self.camera.clone() })
+    }
+
+    /// Number of observations of all points.
+    pub fn observation_count(&self) -> usize {
+        self.points.iter().map(|p| p.observations.len()).sum()
+    }
+}
+
+/// A name that sorts as people count: digits by value.
+#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct NaturalName {
+    key: Vec<(String, u128)>,
+    text: String,
+}
+
+impl NaturalName {
+    fn new(text: String) -> Self {
+        let mut key = Vec::new();
+        let mut rest = text.as_str();
+        while !rest.is_empty() {
+            let word_end = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
+            let (word, tail) = rest.split_at(word_end);
+            let digits_end = tail.find(|c: char| !c.is_ascii_digit()).unwrap_or(tail.len());
+            let (digits, tail) = tail.split_at(digits_end);
+            key.push((word.to_string(), digits.parse().unwrap_or(u128::MAX)));
+            rest = tail;
+        }
+        Self { key, text }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(point: &str, nanos: i64, keyframe: bool) -> LabelRow {
+        let mut observation = Observation::manual(Stamp::from_nanos(nanos), Pixel::new(1.0, 2.0));
+        observation.keyframe = keyframe;
+        LabelRow { point: point.to_string(), observation }
+    }
+
+    #[test]
+    fn segments_start_at_key_frames() {
+        let rows = [
+            row("a", 0, false),
+            row("a", 1, true),
+            row("a", 2, false),
+            row("a", 3, true),
+            row("a", 4, false),
+        ];
+        let set = LabelSet::from_rows(rows).unwrap();
+        let point = &set.points()[0];
+        assert_eq!(point.before_first_keyframe().len(), 1);
+        let segments: Vec<(i64, usize)> =
+            point.segments().map(|s| (s.keyframe.stamp.as_nanos(), s.rest.len())).collect();
+        assert_eq!(segments, [(1, 1), (3, 1)]);
+    }
+
+    #[test]
+    fn names_sort_as_people_count_and_rows_may_come_in_any_order() {
+        let rows = ["10", "2", "tag12.c0", "tag3.c1", "tag3.c0"].map(|n| row(n, 0, true));
+        let set = LabelSet::from_rows(rows).unwrap();
+        let names: Vec<_> = set.points().iter().map(|p| p.name.as_str()).collect();
+        assert_eq!(names, ["2", "10", "tag3.c0", "tag3.c1", "tag12.c0"]);
+        let set = LabelSet::from_rows([row("a", 5, false), row("a", 1, true)]).unwrap();
+        assert_eq!(set.points()[0].segments().next().unwrap().rest.len(), 1);
+        assert_eq!(set.select(&["b".to_string()]), Err("b".to_string()));
+    }
+
+    #[test]
+    fn a_point_is_labelled_once_a_frame() {
+        let twice = LabelSet::from_rows([row("a", 5, true), row("a", 5, false)]);
+        assert!(matches!(twice, Err(LabelError::Duplicate { .. })));
+        assert!(matches!(LabelSet::from_rows([row("", 5, true)]), Err(LabelError::NoName { .. })));
+        let mut nan = row("a", 1, true);
+        nan.observation.px.u = f64::NAN;
+        assert!(matches!(LabelSet::from_rows([nan]), Err(LabelError::NotFinite { .. })));
+    }
+}
