@@ -1,0 +1,386 @@
+//! The pipeline, and the only list of its stages.
+//!
+//! 1. [`Selection`]: the frames and labels of the window; a label at no frame is counted, not lost.
+//! 2. Poses: each stream at each of these frames, or the reason why it has none.
+//! 3. Depth: each source once per key frame, for all its pixels, with the camera placed by the anchor; shared by all
+//!    streams, so that they differ by their motion only.
+//! 4. Tracking and scoring: equation 1 for each segment, distance to the labels, squared errors by point.
+//! 5. RMSE_2D over subsets of the points; RMSE_3D, AOE and ROE of each estimate against the reference.
+//!
+//! No image is decoded on the way.
+
+mod score;
+mod select;
+mod streams;
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+pub use select::{Selection, Window};
+pub use streams::Stream;
+
+use crate::camera::{Camera, Pixel, ProjectError};
+use crate::dataset::{Dataset, Floor};
+use crate::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
+use crate::error::{DataError, DataResult};
+use crate::frames::BodyFromCamera;
+use crate::metrics::align::Alignment;
+use crate::metrics::pixel::{pooled_rmse_px, subset_rmse_px};
+use crate::result::{DatasetPart, PixelPart, PointName, ResultDocument, SCHEMA, Settings, Skip, TrajectoryPart};
+use crate::time::{Span, Stamp};
+use crate::trajectory::NoPose;
+
+/// The reason of labels that a human marked as hidden: not scored, and not counted against the run.
+pub const OCCLUDED: &str = "occluded";
+
+/// Why a label was not scored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum SkipReason {
+    /// Its stamp is no frame of the camera.
+    NoFrame,
+    /// The stamp of its key frame is no frame of the camera.
+    KeyframeNoFrame,
+    /// No key frame precedes it.
+    BeforeFirstKeyframe,
+    /// A human marked it as hidden.
+    Occluded,
+    /// The stream has no pose at its key frame.
+    KeyframeGap,
+    /// Its frame lies in too wide a gap of the stream.
+    FrameGap,
+    /// Its frame lies before the stream's first pose.
+    BeforeStream,
+    /// Its frame lies after the stream's last pose.
+    AfterStream,
+    /// The camera's place in the body is not known at its frame or key frame.
+    NoExtrinsics,
+    /// The key frame's pixel has no depth.
+    NoDepth(DepthMiss),
+    /// The carried point is not in front of the camera.
+    BehindCamera,
+    /// The carried point is so far to the side that the distortion model does not reach it.
+    OutsideModel,
+}
+
+impl SkipReason {
+    /// The name in documents.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NoFrame => "no-frame",
+            Self::KeyframeNoFrame => "keyframe-no-frame",
+            Self::BeforeFirstKeyframe => "before-first-keyframe",
+            Self::Occluded => OCCLUDED,
+            Self::KeyframeGap => "keyframe-gap",
+            Self::FrameGap => "frame-gap",
+            Self::BeforeStream => "before-stream",
+            Self::AfterStream => "after-stream",
+            Self::NoExtrinsics => "no-extrinsics",
+            Self::BehindCamera => "behind-camera",
+            Self::OutsideModel => "outside-model",
+            Self::NoDepth(miss) => match miss {
+                DepthMiss::NoAnchor => "keyframe-no-anchor",
+                DepthMiss::AboveHorizon => "keyframe-above-horizon",
+                DepthMiss::OutsideModel => "keyframe-outside-model",
+                DepthMiss::OutsideImage => "keyframe-outside-image",
+                DepthMiss::EmptyView => "keyframe-empty-view",
+                DepthMiss::OutsideHull => "keyframe-outside-hull",
+                DepthMiss::TriangleTooWide => "keyframe-triangle-too-wide",
+                DepthMiss::OcclusionEdge => "keyframe-occlusion-edge",
+                DepthMiss::NoDepth => "keyframe-no-depth",
+                DepthMiss::OutOfRange => "keyframe-depth-out-of-range",
+                DepthMiss::NoSurface => "keyframe-no-surface",
+            },
+        }
+    }
+
+    const fn of_frame(no_pose: NoPose) -> Self {
+        match no_pose {
+            NoPose::BeforeStart => Self::BeforeStream,
+            NoPose::AfterEnd => Self::AfterStream,
+            NoPose::Gap { .. } => Self::FrameGap,
+        }
+    }
+
+    const fn of_projection(error: ProjectError) -> Self {
+        match error {
+            ProjectError::BehindCamera => Self::BehindCamera,
+            ProjectError::OutsideModel => Self::OutsideModel,
+        }
+    }
+}
+
+/// Why nothing could be evaluated.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EvaluateError {
+    /// The camera has no frames.
+    #[error("the camera has no frames")]
+    NoFrames,
+    /// There are no labels.
+    #[error("there are no labels")]
+    NoLabels,
+    /// A label lies outside the image.
+    #[error("{}label of point {point} at {stamp} ns lies at ({u_px}, {v_px}) px, outside the {width}x{height} image",
+        line.map_or_else(String::new, |l| format!("line {l}: ")))]
+    LabelOutside {
+        /// The point.
+        point: String,
+        /// The frame.
+        stamp: Stamp,
+        /// To the right.
+        u_px: f64,
+        /// Downwards.
+        v_px: f64,
+        /// Columns of the image.
+        width: u32,
+        /// Rows of the image.
+        height: u32,
+        /// Line of the labels file, where known.
+        line: Option<u64>,
+    },
+    /// No label is at a frame.
+    #[error("none of the labels is at a frame: labels {} to {} ns, frames {} to {} ns{}",
+        labels.0, labels.1, frames.0, frames.1, suspicion.as_ref().map_or_else(String::new, |s| format!(" ({s})")))]
+    NoLabelAtFrame {
+        /// First and last label.
+        labels: (Stamp, Stamp),
+        /// First and last frame.
+        frames: (Stamp, Stamp),
+        /// A unit that may be mixed up.
+        suspicion: Option<String>,
+    },
+    /// No labelled frame lies in the window.
+    #[error("no label with a key frame lies between --start and --start + --duration")]
+    EmptyWindow,
+    /// More points are asked for than there are.
+    #[error("subsets of {asked} points were asked for, but there are {points} points")]
+    SubsetTooLarge {
+        /// What was asked for.
+        asked: usize,
+        /// How many points there are.
+        points: usize,
+    },
+    /// A stream has no pose within the evaluated frames.
+    #[error("stream {stream} and the evaluated frames do not overlap in time: poses {} to {} ns, frames {} to {} ns{}",
+        poses.0, poses.1, frames.0, frames.1, suspicion.as_ref().map_or_else(String::new, |s| format!(" ({s})")))]
+    NoOverlap {
+        /// The stream.
+        stream: String,
+        /// First and last pose.
+        poses: (Stamp, Stamp),
+        /// First and last evaluated frame.
+        frames: (Stamp, Stamp),
+        /// A unit that may be mixed up.
+        suspicion: Option<String>,
+    },
+    /// The data set could not be read.
+    #[error(transparent)]
+    Data(#[from] DataError),
+}
+
+/// What is evaluated, and how.
+pub struct Evaluation<'a> {
+    /// The data set.
+    pub dataset: &'a dyn Dataset,
+    /// Name of its camera.
+    pub camera_name: &'a str,
+    /// The camera's intrinsics, the data set's own or others.
+    pub camera: &'a Camera,
+    /// Extrinsics that replace the data set's.
+    pub body_from_camera: Option<BodyFromCamera>,
+    /// The camera's frames.
+    pub frames: &'a [Stamp],
+    /// What takes part.
+    pub selection: &'a Selection<'a>,
+    /// The pose streams, the reference first where there is one.
+    pub streams: &'a [Stream],
+    /// Index of the stream that places the camera for depth.
+    pub anchor: usize,
+    /// The depth sources.
+    pub depths: &'a [&'a dyn DepthSource],
+    /// A floor that replaces the data set's.
+    pub floor: Option<Floor>,
+    /// Widest gap between two poses that is interpolated.
+    pub max_gap: Span,
+    /// Subset sizes; `None` for those up to 3 that exist.
+    pub subsets: Option<&'a [usize]>,
+    /// Alignment of the trajectory errors.
+    pub align: Alignment,
+    /// Whether the document lists the scored samples.
+    pub keep_samples: bool,
+    /// What the document says about the settings.
+    pub settings: Settings,
+}
+
+/// Depths of the pixels at the key frames of one source, by frame and pixel bits.
+type DepthTable = BTreeMap<(usize, PixelKey), Result<DepthSample, DepthMiss>>;
+
+/// A pixel as a key: two labels at the same place are one question.
+type PixelKey = (u64, u64);
+
+fn pixel_key(px: Pixel) -> PixelKey {
+    (px.u.to_bits(), px.v.to_bits())
+}
+
+/// Runs the pipeline. `progress` is called with (done, total) as key frames and streams are finished.
+///
+/// # Errors
+/// [`EvaluateError`] if nothing could be evaluated; what only some labels lack is counted in the document.
+pub fn evaluate(
+    evaluation: &Evaluation<'_>,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<ResultDocument, EvaluateError> {
+    let selection = evaluation.selection;
+    let sizes = subset_sizes(evaluation.subsets, selection.point_count())?;
+    let frames_range = selection.stamp_range(evaluation.frames).ok_or(EvaluateError::EmptyWindow)?;
+    for stream in evaluation.streams {
+        stream.check_overlap(frames_range)?;
+    }
+    let cameras = extrinsics(evaluation)?;
+    let poses: Vec<_> = evaluation
+        .streams
+        .iter()
+        .map(|s| s.poses_at(evaluation.frames, &selection.frames, evaluation.max_gap))
+        .collect();
+
+    let total = evaluation.depths.len() * (1 + evaluation.streams.len());
+    let mut done = 0;
+    let mut pixel = Vec::new();
+    for source in evaluation.depths {
+        let depths = keyframe_depths(evaluation, *source, &cameras, &poses[evaluation.anchor])?;
+        done += 1;
+        progress(done, total);
+        for (stream, poses) in evaluation.streams.iter().zip(&poses) {
+            let scored = score::score(evaluation, &cameras, poses, &depths);
+            let rmse_px = subset_rmse_px(&scored.errors, &sizes);
+            pixel.push(PixelPart {
+                stream: stream.name.clone(),
+                role: stream.role,
+                depth: source.name().to_string(),
+                rmse_px,
+                pooled_rmse_px: pooled_rmse_px(&scored.errors),
+                scored: scored.errors.iter().map(|e| e.count).sum(),
+                skipped: scored.skipped,
+                keyframes: scored.keyframes,
+                samples: scored.samples,
+            });
+            done += 1;
+            progress(done, total);
+        }
+    }
+    Ok(ResultDocument {
+        schema: SCHEMA.to_string(),
+        vice_version: env!("CARGO_PKG_VERSION").to_string(),
+        dataset: DatasetPart {
+            name: evaluation.dataset.name().to_string(),
+            format: evaluation.dataset.format().to_string(),
+            camera: evaluation.camera_name.to_string(),
+        },
+        settings: evaluation.settings.clone(),
+        pixel,
+        trajectory: trajectory_parts(evaluation),
+    })
+}
+
+fn subset_sizes(asked: Option<&[usize]>, points: usize) -> Result<Vec<usize>, EvaluateError> {
+    match asked {
+        None => Ok((1..=points.min(3)).collect()),
+        Some(sizes) => match sizes.iter().find(|s| **s > points || **s == 0) {
+            Some(asked) => Err(EvaluateError::SubsetTooLarge { asked: *asked, points }),
+            None => Ok(sizes.to_vec()),
+        },
+    }
+}
+
+/// Extrinsics at the selected frames. A frame without is skipped and counted; only where all lack them it is an error.
+fn extrinsics(evaluation: &Evaluation<'_>) -> DataResult<Vec<Option<BodyFromCamera>>> {
+    if let Some(fixed) = evaluation.body_from_camera {
+        return Ok(vec![Some(fixed); evaluation.selection.frames.len()]);
+    }
+    let mut first_error = None;
+    let mut found = Vec::with_capacity(evaluation.selection.frames.len());
+    for frame in &evaluation.selection.frames {
+        match evaluation.dataset.body_from_camera(evaluation.camera_name, evaluation.frames[*frame]) {
+            Ok(body_from_camera) => found.push(Some(body_from_camera)),
+            Err(error) => {
+                first_error.get_or_insert(error);
+                found.push(None);
+            }
+        }
+    }
+    match first_error {
+        Some(error) if found.iter().all(Option::is_none) => Err(error),
+        Some(error) => {
+            let lacking = found.iter().filter(|f| f.is_none()).count();
+            tracing::warn!("{lacking} of {} frames have no camera pose in the body: {error}", found.len());
+            Ok(found)
+        }
+        None => Ok(found),
+    }
+}
+
+/// Asks one source for the depths of all key-frame pixels, key frames in parallel.
+fn keyframe_depths(
+    evaluation: &Evaluation<'_>,
+    source: &dyn DepthSource,
+    cameras: &[Option<BodyFromCamera>],
+    anchor: &streams::PosesAtFrames,
+) -> Result<DepthTable, EvaluateError> {
+    let mut pixels: BTreeMap<usize, BTreeMap<PixelKey, Pixel>> = BTreeMap::new();
+    for segment in evaluation.selection.points.iter().flat_map(|p| &p.segments) {
+        let px = segment.keyframe.observation.px;
+        pixels.entry(segment.keyframe.frame).or_default().insert(pixel_key(px), px);
+    }
+    let asked: Vec<(usize, BTreeMap<PixelKey, Pixel>)> = pixels.into_iter().collect();
+    let answers: Vec<DataResult<Vec<_>>> = asked
+        .par_iter()
+        .map(|(frame, pixels)| {
+            let at = position(&evaluation.selection.frames, *frame);
+            let Some(body_from_camera) = cameras[at] else { return Ok(vec![]) };
+            let stamp = evaluation.frames[*frame];
+            let keyframe = Keyframe {
+                stamp,
+                frame: *frame,
+                camera: evaluation.camera,
+                body_from_camera,
+                world_from_camera: anchor[at].ok().map(|pose| pose * body_from_camera),
+                floor: match evaluation.floor {
+                    Some(floor) => floor,
+                    None => evaluation.dataset.floor(stamp)?,
+                },
+            };
+            let list: Vec<Pixel> = pixels.values().copied().collect();
+            let depths = source.depths(&keyframe, &list)?;
+            Ok(pixels.keys().zip(depths).map(|(key, depth)| ((*frame, *key), depth)).collect())
+        })
+        .collect();
+    let mut table = DepthTable::new();
+    for answer in answers {
+        table.extend(answer?);
+    }
+    Ok(table)
+}
+
+/// Position of a frame among the selected ones, which hold every frame that a segment names.
+fn position(selected: &[usize], frame: usize) -> usize {
+    selected.partition_point(|f| *f < frame)
+}
+
+fn trajectory_parts(evaluation: &Evaluation<'_>) -> Vec<TrajectoryPart> {
+    let Some(reference) = evaluation.streams.iter().find(|s| s.role == crate::result::Role::Reference) else {
+        return vec![];
+    };
+    let stamps: Vec<Stamp> = evaluation.selection.frames.iter().map(|f| evaluation.frames[*f]).collect();
+    evaluation
+        .streams
+        .iter()
+        .filter(|s| s.role == crate::result::Role::Estimate)
+        .map(|estimate| streams::compare(reference, estimate, &stamps, evaluation.max_gap, evaluation.align))
+        .collect()
+}
+
+fn skip(point: &PointName, stamp: Stamp, reason: SkipReason) -> Skip {
+    Skip { point: point.clone(), timestamp_ns: stamp, reason: reason.name().to_string() }
+}

@@ -1,0 +1,241 @@
+//! Which frames and labels take part, before any pose is looked at.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use super::{EvaluateError, SkipReason};
+use crate::camera::Camera;
+use crate::label::{LabelSet, Observation};
+use crate::time::{Span, Stamp, suspect_unit};
+
+/// The part of a run that is evaluated.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Window {
+    /// Keep the frame nearest to each tick of this rate (Hz), and every key frame. `None` keeps every labelled frame.
+    pub fps: Option<f64>,
+    /// Counts from the camera's first frame.
+    pub start: Span,
+    /// Counts from `start`; `None` to the end.
+    pub duration: Option<Span>,
+}
+
+/// A label and the index of its frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Matched<'a> {
+    pub(super) observation: &'a Observation,
+    pub(super) frame: usize,
+}
+
+/// A key frame and the labels that are scored against it.
+#[derive(Debug)]
+pub(super) struct SelectedSegment<'a> {
+    pub(super) keyframe: Matched<'a>,
+    pub(super) samples: Vec<Matched<'a>>,
+}
+
+/// A point with what is scored of it, and what is known not to be.
+#[derive(Debug)]
+pub(super) struct SelectedPoint<'a> {
+    pub(super) name: Arc<str>,
+    pub(super) segments: Vec<SelectedSegment<'a>>,
+    pub(super) skips: Vec<(Stamp, SkipReason)>,
+}
+
+/// The frames and labels that take part.
+#[derive(Debug)]
+pub struct Selection<'a> {
+    pub(super) points: Vec<SelectedPoint<'a>>,
+    /// Indices of frames with a key frame or a sample, ascending.
+    pub(super) frames: Vec<usize>,
+}
+
+impl<'a> Selection<'a> {
+    /// Matches labels with frames by their exact stamp and keeps those of the window.
+    ///
+    /// A segment whose key frame lies before the window keeps that key frame: it says what the point is.
+    ///
+    /// # Errors
+    /// [`EvaluateError`] if there are no labels, none is at a frame, one lies outside the image, or the window is
+    /// empty.
+    pub fn new(
+        labels: &'a LabelSet,
+        frames: &[Stamp],
+        camera: &Camera,
+        window: &Window,
+    ) -> Result<Self, EvaluateError> {
+        let (Some(first), Some(last)) = (frames.first(), frames.last()) else { return Err(EvaluateError::NoFrames) };
+        if labels.observation_count() == 0 {
+            return Err(EvaluateError::NoLabels);
+        }
+        check_inside(labels, camera)?;
+        let kept = KeptFrames::new(frames, window);
+        let mut selection = Self { points: Vec::new(), frames: Vec::new() };
+        let mut used = BTreeSet::new();
+        let mut at_a_frame = false;
+        for point in labels.points() {
+            let mut selected = SelectedPoint { name: point.name.as_str().into(), segments: vec![], skips: vec![] };
+            for observation in point.before_first_keyframe() {
+                at_a_frame |= frames.binary_search(&observation.stamp).is_ok();
+                if kept.covers(observation.stamp) {
+                    selected.skips.push((observation.stamp, SkipReason::BeforeFirstKeyframe));
+                }
+            }
+            for segment in point.segments() {
+                let keyframe = frames.binary_search(&segment.keyframe.stamp).ok();
+                at_a_frame |= keyframe.is_some();
+                let mut samples = Vec::new();
+                for observation in segment.rest {
+                    let frame = frames.binary_search(&observation.stamp).ok();
+                    at_a_frame |= frame.is_some();
+                    if !kept.covers(observation.stamp) {
+                        continue;
+                    }
+                    match (frame, keyframe) {
+                        (None, _) => selected.skips.push((observation.stamp, SkipReason::NoFrame)),
+                        (Some(frame), _) if !kept.has(frame) => {}
+                        (Some(_), None) => selected.skips.push((observation.stamp, SkipReason::KeyframeNoFrame)),
+                        (Some(_), _) if observation.occluded => {
+                            selected.skips.push((observation.stamp, SkipReason::Occluded));
+                        }
+                        (Some(frame), Some(_)) => samples.push(Matched { observation, frame }),
+                    }
+                }
+                let Some(frame) = keyframe else {
+                    if kept.covers(segment.keyframe.stamp) {
+                        selected.skips.push((segment.keyframe.stamp, SkipReason::NoFrame));
+                    }
+                    continue;
+                };
+                if samples.is_empty() && !kept.covers(segment.keyframe.stamp) {
+                    continue;
+                }
+                used.insert(frame);
+                used.extend(samples.iter().map(|s| s.frame));
+                let keyframe = Matched { observation: segment.keyframe, frame };
+                selected.segments.push(SelectedSegment { keyframe, samples });
+            }
+            selection.points.push(selected);
+        }
+        if !at_a_frame {
+            return Err(no_label_at_a_frame(labels, (*first, *last)));
+        }
+        selection.frames = used.into_iter().collect();
+        if selection.frames.is_empty() {
+            return Err(EvaluateError::EmptyWindow);
+        }
+        Ok(selection)
+    }
+
+    /// The earliest key frame that takes part.
+    pub fn first_keyframe(&self) -> Option<Stamp> {
+        self.points.iter().flat_map(|p| &p.segments).map(|s| s.keyframe.observation.stamp).min()
+    }
+
+    /// The first and last frame that takes part.
+    pub fn stamp_range(&self, frames: &[Stamp]) -> Option<(Stamp, Stamp)> {
+        Some((frames[*self.frames.first()?], frames[*self.frames.last()?]))
+    }
+
+    /// Number of points with a name, scored or not.
+    pub fn point_count(&self) -> usize {
+        self.points.len()
+    }
+}
+
+fn check_inside(labels: &LabelSet, camera: &Camera) -> Result<(), EvaluateError> {
+    for point in labels.points() {
+        if let Some(o) = point.observations.iter().find(|o| !camera.contains(o.px)) {
+            return Err(EvaluateError::LabelOutside {
+                point: point.name.clone(),
+                stamp: o.stamp,
+                u_px: o.px.u,
+                v_px: o.px.v,
+                width: camera.width(),
+                height: camera.height(),
+                line: (o.line > 0).then_some(o.line),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn no_label_at_a_frame(labels: &LabelSet, frames: (Stamp, Stamp)) -> EvaluateError {
+    let stamps = || labels.points().iter().flat_map(|p| &p.observations).map(|o| o.stamp);
+    let labels = (stamps().min().unwrap_or_default(), stamps().max().unwrap_or_default());
+    EvaluateError::NoLabelAtFrame { labels, frames, suspicion: suspect_unit(labels, frames) }
+}
+
+/// The frames of the window.
+struct KeptFrames {
+    first: Stamp,
+    last: Stamp,
+    /// With a rate, the frames nearest to its ticks; without, all.
+    ticked: Option<BTreeSet<usize>>,
+}
+
+impl KeptFrames {
+    fn new(frames: &[Stamp], window: &Window) -> Self {
+        let first = frames[0] + window.start;
+        let last = window.duration.map_or(Stamp::MAX, |d| first + d);
+        let ticked = window.fps.map(|fps| {
+            let period_ns = 1e9 / fps;
+            let end = last.min(frames[frames.len() - 1]);
+            let mut ticked = BTreeSet::new();
+            let mut next_frame = frames.partition_point(|s| *s < first);
+            // Ticks between two frames all choose one of the two, so that walking frames, not ticks, bounds the work.
+            while next_frame < frames.len() {
+                let before = next_frame.checked_sub(1).filter(|i| frames[*i] >= first);
+                let stamp = frames[next_frame];
+                let from_ns = before.map_or(0, |i| frames[i].since(first).as_nanos()) as f64;
+                let to_ns = stamp.since(first).as_nanos() as f64;
+                let middle = before.map_or(f64::NEG_INFINITY, |_| 0.5 * (from_ns + to_ns));
+                let limit_ns = end.since(first).as_nanos() as f64;
+                let first_tick = (from_ns / period_ns).ceil();
+                let last_tick = (to_ns.min(limit_ns) / period_ns).floor();
+                if first_tick <= last_tick {
+                    // A tick in the middle chooses the earlier frame.
+                    if let Some(before) = before.filter(|_| first_tick * period_ns <= middle) {
+                        ticked.insert(before);
+                    }
+                    if last_tick * period_ns > middle {
+                        ticked.insert(next_frame);
+                    }
+                }
+                next_frame += 1;
+            }
+            ticked
+        });
+        Self { first, last, ticked }
+    }
+
+    fn covers(&self, stamp: Stamp) -> bool {
+        stamp >= self.first && stamp <= self.last
+    }
+
+    fn has(&self, frame: usize) -> bool {
+        self.ticked.as_ref().is_none_or(|t| t.contains(&frame))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kept(millis: &[i64], fps: f64, duration_ms: Option<i64>) -> Vec<usize> {
+        let frames: Vec<Stamp> = millis.iter().map(|m| Stamp::from_nanos(m * 1_000_000)).collect();
+        let window = Window { fps: Some(fps), start: Span::ZERO, duration: duration_ms.map(Span::from_millis) };
+        KeptFrames::new(&frames, &window).ticked.unwrap().into_iter().collect()
+    }
+
+    #[test]
+    fn each_tick_keeps_its_nearest_frame() {
+        let twenty_hz: Vec<i64> = (0..21).map(|i| 1000 + 50 * i).collect();
+        assert_eq!(kept(&twenty_hz, 10.0, None), (0..21).step_by(2).collect::<Vec<_>>());
+        assert_eq!(kept(&twenty_hz, 10.0, Some(300)), [0, 2, 4, 6]);
+        // Ticks at 0, 100, 200 ...: 130 is nearest to 100, 180 to 200, and 500 to those from 340 on.
+        assert_eq!(kept(&[0, 60, 130, 180, 500], 10.0, None), [0, 2, 3, 4]);
+        assert_eq!(kept(&[0], 10.0, None), [0]);
+        // Faster than the frames: all are kept.
+        assert_eq!(kept(&[0, 10, 20, 33], 1000.0, None), [0, 1, 2, 3]);
+    }
+}

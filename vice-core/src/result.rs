@@ -1,0 +1,216 @@
+//! The result document `vice.result/1`: what an evaluation found, and all that is needed to repeat and to plot it.
+//!
+//! Units stand in the names. A number that could not be had is null, never NaN.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::camera::Pixel;
+use crate::metrics::pixel::SubsetRmse;
+use crate::time::Stamp;
+
+/// The schema's name and version.
+pub const SCHEMA: &str = "vice.result/1";
+
+/// The document.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResultDocument {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// Version of VICE that wrote it.
+    #[serde(default)]
+    pub vice_version: String,
+    /// What was evaluated.
+    pub dataset: DatasetPart,
+    /// How it was evaluated.
+    pub settings: Settings,
+    /// Pixel errors, one entry for each pose stream and depth source.
+    pub pixel: Vec<PixelPart>,
+    /// Estimates against the reference, where there is one.
+    pub trajectory: Vec<TrajectoryPart>,
+}
+
+/// What was evaluated.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DatasetPart {
+    /// Name of the data set.
+    pub name: String,
+    /// Its format.
+    pub format: String,
+    /// The camera.
+    pub camera: String,
+}
+
+/// How it was evaluated, as given or as chosen by default.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// File of the labels.
+    pub labels: String,
+    /// Names of the points that take part.
+    pub points: Vec<String>,
+    /// Frames a second, null where every labelled frame counts.
+    pub fps: Option<f64>,
+    /// Seconds after the camera's first frame.
+    pub start_s: f64,
+    /// Seconds, null to the end.
+    pub duration_s: Option<f64>,
+    /// Widest gap between two poses that is interpolated, seconds.
+    pub max_gap_s: f64,
+    /// Seconds added to the estimates' stamps.
+    pub time_offset_s: f64,
+    /// Alignment of the trajectory errors.
+    pub align: String,
+    /// The pose stream that places the camera for depth.
+    pub anchor: String,
+    /// Calibration file that overrides the data set's, where there is one.
+    pub calibration: Option<String>,
+    /// The floor plane `n·p + d = 0` in the world that overrides the data set's: nx, ny, nz, d.
+    pub floor_plane: Option<[f64; 4]>,
+    /// Whether the Z-map tests occlusion.
+    pub zmap_occlusion: bool,
+    /// Whose poses the estimates are.
+    pub estimate_frame: String,
+    /// What else was set, by option.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub other: BTreeMap<String, String>,
+}
+
+/// Whether a stream is what is evaluated or what it is compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// Ground truth or whatever takes its place.
+    Reference,
+    /// An on-board estimate.
+    Estimate,
+}
+
+/// Pixel errors of one pose stream with one depth source.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PixelPart {
+    /// Name of the pose stream.
+    pub stream: String,
+    /// Its role.
+    pub role: Role,
+    /// Name of the depth source.
+    pub depth: String,
+    /// RMSE_2D by number of points, pixels; null where fewer points were scored.
+    pub rmse_px: BTreeMap<usize, Option<SubsetRmse>>,
+    /// RMSE_2D of all points together, pixels; null where nothing was scored.
+    pub pooled_rmse_px: Option<f64>,
+    /// Number of scored samples.
+    pub scored: u64,
+    /// What could not be scored, and why.
+    pub skipped: Vec<Skip>,
+    /// Key frames that were used, with their depth.
+    pub keyframes: Vec<KeyframePart>,
+    /// The scored samples; empty where they were not asked for.
+    pub samples: Vec<Sample>,
+}
+
+/// A label that could not be scored.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Skip {
+    /// Name of the point.
+    pub point: PointName,
+    /// The frame.
+    pub timestamp_ns: Stamp,
+    /// Why: see [`crate::evaluate::SkipReason`].
+    pub reason: String,
+}
+
+/// A key frame and the depth that lifted its pixel.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct KeyframePart {
+    /// Name of the point.
+    pub point: PointName,
+    /// The frame.
+    pub timestamp_ns: Stamp,
+    /// Metres along the optical axis.
+    pub depth_z_m: f64,
+    /// The pixel's neighbourhood straddles a depth edge.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub on_edge: bool,
+}
+
+/// One scored label.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sample {
+    /// Name of the point.
+    pub point: PointName,
+    /// The frame.
+    pub timestamp_ns: Stamp,
+    /// Where the label says the point is.
+    pub label_px: Pixel,
+    /// Where the pose stream carried it.
+    pub tracked_px: Pixel,
+    /// Distance of the two.
+    pub error_px: f64,
+}
+
+/// A point's name, shared by its samples.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct PointName(pub Arc<str>);
+
+impl Serialize for PointName {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&self.0)
+    }
+}
+
+impl<'de> Deserialize<'de> for PointName {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer).map(|text| Self(text.into()))
+    }
+}
+
+/// An estimate against the reference, both at the evaluated frames.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrajectoryPart {
+    /// Name of the estimate.
+    pub estimate: String,
+    /// Name of the reference.
+    pub reference: String,
+    /// Alignment that was applied.
+    pub align: String,
+    /// Number of frames at which both have a pose.
+    pub matched: usize,
+    /// RMS of the position error, metres.
+    pub rmse_3d_m: Option<f64>,
+    /// RMS of the rotation error, radians.
+    pub aoe_rad: Option<f64>,
+    /// Mean rotation error between consecutive frames, radians.
+    pub roe_rad: Option<f64>,
+    /// Why the numbers are null, where they are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub problem: Option<String>,
+}
+
+impl ResultDocument {
+    /// Largest share of labels that could not be scored, over all parts, in percent; marks by a human do not count.
+    pub fn worst_skipped_percent(&self) -> f64 {
+        self.pixel.iter().map(PixelPart::skipped_percent).fold(0.0, f64::max)
+    }
+}
+
+impl PixelPart {
+    /// Share of labels that could not be scored, in percent. Where nothing was scored it is 100, whatever the reason.
+    pub fn skipped_percent(&self) -> f64 {
+        if self.scored == 0 {
+            return 100.0;
+        }
+        let skipped = self.skipped.iter().filter(|s| s.reason != crate::evaluate::OCCLUDED).count() as f64;
+        100.0 * skipped / (skipped + self.scored as f64)
+    }
+
+    /// Number of skipped labels by reason, sorted by reason.
+    pub fn skips_by_reason(&self) -> BTreeMap<&str, usize> {
+        let mut counts = BTreeMap::new();
+        for skip in &self.skipped {
+            *counts.entry(skip.reason.as_str()).or_insert(0) += 1;
+        }
+        counts
+    }
+}

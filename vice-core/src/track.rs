@@ -1,0 +1,130 @@
+//! Equation 1 of the paper: a key point carried along by ego-motion.
+//!
+//! At a key frame `k` the pixel is lifted with its depth, `p_camera = z (x, y, 1)`, and placed in the world of the pose
+//! stream under evaluation, `p_world = world_from_body(k) body_from_camera(k) p_camera`. At a later frame `t` its pixel
+//! is the projection of `(world_from_body(t) body_from_camera(t))⁻¹ p_world`. Only the motion between the two frames
+//! enters, so that the stream's own world frame does not matter.
+
+use nalgebra::Point3;
+
+use crate::camera::{Camera, Pixel, ProjectError, UnprojectError};
+use crate::frames::{self, Rigid, WorldFromCamera};
+
+/// The scene point of a pixel: `z (x, y, 1)` in the camera frame, metres; `z_m` is along the optical axis.
+///
+/// # Errors
+/// [`UnprojectError`] if the pixel has no ray.
+pub fn lift(camera: &Camera, px: Pixel, z_m: f64) -> Result<Point3<f64>, UnprojectError> {
+    Ok(Point3::from(camera.unproject(px)? * z_m))
+}
+
+/// Where the camera at a later frame sees a point that was lifted at a key frame.
+///
+/// `point_camera_m` is in the camera frame of the key frame. The two poses are of the same pose stream.
+///
+/// # Errors
+/// [`ProjectError`] if the point has no pixel there. A pixel outside the image is no error.
+pub fn track(
+    camera: &Camera,
+    at_keyframe: &WorldFromCamera,
+    now: &WorldFromCamera,
+    point_camera_m: &Point3<f64>,
+) -> Result<Pixel, ProjectError> {
+    let now_from_keyframe: Rigid<frames::Camera, frames::Camera> = now.inverse() * *at_keyframe;
+    camera.project(&now_from_keyframe.transform_point(point_camera_m))
+}
+
+/// [`lift`] and [`track`] for many pixels of one key frame, in structure-of-arrays form.
+///
+/// `(u, v)` are pixels of the key frame, `z_m` their depths. The tracked pixels replace them. Where a pixel has no ray
+/// or its point no pixel, `valid[i]` is false and the pixel NaN. Returns how many are valid.
+///
+/// # Panics
+/// If the slices differ in length.
+pub fn track_batch(
+    camera: &Camera,
+    at_keyframe: &WorldFromCamera,
+    now: &WorldFromCamera,
+    [u, v]: [&mut [f64]; 2],
+    z_m: &[f64],
+    valid: &mut [bool],
+) -> usize {
+    assert!(
+        [v.len(), z_m.len(), valid.len()].iter().all(|len| *len == u.len()),
+        "track_batch: slices differ in length"
+    );
+    let now_from_keyframe: Rigid<frames::Camera, frames::Camera> = now.inverse() * *at_keyframe;
+    let mut count = 0;
+    for i in 0..u.len() {
+        let tracked = lift(camera, Pixel::new(u[i], v[i]), z_m[i])
+            .ok()
+            .and_then(|p| camera.project(&now_from_keyframe.transform_point(&p)).ok());
+        valid[i] = tracked.is_some();
+        count += usize::from(valid[i]);
+        let px = tracked.unwrap_or(Pixel::new(f64::NAN, f64::NAN));
+        (u[i], v[i]) = (px.u, px.v);
+    }
+    count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Model;
+    use nalgebra::{UnitQuaternion, Vector3};
+    use proptest::prelude::*;
+
+    fn camera() -> Camera {
+        let model = Model::from_name("radtan", &[-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]).unwrap();
+        Camera::new(752, 480, [458.654, 457.296, 367.215, 248.375], model).unwrap()
+    }
+
+    fn any_pose(reach: f64) -> impl Strategy<Value = WorldFromCamera> {
+        let numbers = prop::array::uniform6(-1.0..1.0_f64);
+        numbers.prop_map(move |n| {
+            let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(n[3], n[4], n[5]) * reach);
+            Rigid::from_parts(Vector3::new(n[0], n[1], n[2]) * reach, rotation)
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn without_motion_a_point_stays(pose in any_pose(3.0), u in 5.0..740.0_f64, v in 5.0..470.0_f64, z in 0.1..30.0_f64) {
+            let c = camera();
+            let p = lift(&c, Pixel::new(u, v), z).unwrap();
+            prop_assert!((p.z - z).abs() < 1e-12 * z);
+            let px = track(&c, &pose, &pose, &p).unwrap();
+            prop_assert!(px.distance_px(Pixel::new(u, v)) < 1e-7);
+        }
+
+        #[test]
+        fn the_world_frame_does_not_matter(
+            other_from_world in any_pose(5.0), k in any_pose(0.3), t in any_pose(0.3), z in 1.0..8.0_f64,
+        ) {
+            let c = camera();
+            let p = lift(&c, Pixel::new(300.0, 200.0), z).unwrap();
+            let other: Rigid<frames::World, frames::World> = other_from_world.reinterpret();
+            let (a, b) = (track(&c, &k, &t, &p), track(&c, &(other * k), &(other * t), &p));
+            match (a, b) {
+                (Ok(a), Ok(b)) => prop_assert!(a.distance_px(b) < 1e-6),
+                (a, b) => prop_assert_eq!(a.is_err(), b.is_err()),
+            }
+        }
+
+        #[test]
+        fn the_batch_is_the_single_point(k in any_pose(0.3), t in any_pose(0.3), zs in prop::collection::vec(-1.0..8.0_f64, 1..20)) {
+            let c = camera();
+            let n = zs.len();
+            let us: Vec<f64> = (0..n).map(|i| 40.0 * i as f64 - 30.0).collect();
+            let (mut u, mut v, mut valid) = (us.clone(), vec![200.0; n], vec![true; n]);
+            track_batch(&c, &k, &t, [&mut u, &mut v], &zs, &mut valid);
+            for i in 0..n {
+                let single = lift(&c, Pixel::new(us[i], 200.0), zs[i]).ok().and_then(|p| track(&c, &k, &t, &p).ok());
+                prop_assert_eq!(valid[i], single.is_some());
+                if let Some(px) = single {
+                    prop_assert_eq!(px, Pixel::new(u[i], v[i]));
+                }
+            }
+        }
+    }
+}
