@@ -2,16 +2,24 @@
 //!
 //! A flight comes in through a [`dataset::Dataset`]: stamps ([`time`]), poses ([`trajectory`], [`imu`]), frames and
 //! calibration ([`camera`], [`frames`]). Reference key points of a [`label::LabelSet`] get a depth from a
-//! [`depth::DepthSource`] at their key frame and are carried along by each pose stream.
+//! [`depth::DepthSource`] at their key frame, are carried along by each pose stream ([`track`], the paper's equation 1)
+//! and compared in pixels with their labels ([`metrics`]). [`mod@evaluate`] is the list of these stages, and a
+//! [`result::ResultDocument`] is what leaves. Formats are found by name or by looking in a [`registry::Registry`].
+//!
+//! The core reads no files and decodes nothing: adapters do.
 #![forbid(unsafe_code)]
 
 pub mod camera;
 pub mod dataset;
 pub mod depth;
 pub mod error;
+pub mod evaluate;
 pub mod frames;
 pub mod imu;
 pub mod label;
+pub mod metrics;
 pub mod registry;
+pub mod result;
 pub mod time;
+pub mod track;
 pub mod trajectory;

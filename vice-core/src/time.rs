@@ -216,7 +216,8 @@ impl fmt::Display for Span {
 pub fn suspect_unit(former: (Stamp, Stamp), latter: (Stamp, Stamp)) -> Option<String> {
     let size = |(a, b): (Stamp, Stamp)| (a.0.unsigned_abs().max(b.0.unsigned_abs())) as f64;
     let (former, latter) = (size(former), size(latter));
-    let (who, ratio) = if former < latter { ("former", latter / former) } else { ("latter", former / latter) };
+    let (who, ratio) =
+        if former < latter { ("former", latter / former) } else { ("latter", former / latter) };
     let units = [(1e3, "microseconds"), (1e6, "milliseconds"), (1e9, "seconds")];
     // Stamps of one epoch agree to a few per cent; a factor of two leaves room for clocks that started at boot.
     let (_, unit) = units.into_iter().find(|(factor, _)| (0.5..2.0).contains(&(ratio / factor)))?;
@@ -314,9 +315,16 @@ mod tests {
         let ns = |a: i64, b: i64| (Stamp::from_nanos(a), Stamp::from_nanos(b));
         let flight = ns(1403715273262142976, 1403715418762142976);
         let said = |a| suspect_unit(a, flight).unwrap_or_default();
-        assert_eq!(said(ns(1403715273, 1403715418)), "the former look like seconds where nanoseconds are expected");
+        assert_eq!(
+            said(ns(1403715273, 1403715418)),
+            "the former look like seconds where nanoseconds are expected"
+        );
         assert!(said(ns(1403715273262, 1403715418762)).contains("milliseconds"));
-        assert!(suspect_unit(flight, ns(1403715273262142, 1403715418762142)).unwrap().contains("the latter look like micro"));
+        assert!(
+            suspect_unit(flight, ns(1403715273262142, 1403715418762142))
+                .unwrap()
+                .contains("the latter look like micro")
+        );
         assert_eq!(suspect_unit(flight, ns(1503715273262142976, 1503715273262142976)), None);
         assert_eq!(suspect_unit(flight, ns(0, 0)), None);
     }

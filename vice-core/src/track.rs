@@ -75,7 +75,8 @@ mod tests {
     use proptest::prelude::*;
 
     fn camera() -> Camera {
-        let model = Model::from_name("radtan", &[-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]).unwrap();
+        let model =
+            Model::from_name("radtan", &[-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]).unwrap();
         Camera::new(752, 480, [458.654, 457.296, 367.215, 248.375], model).unwrap()
     }
 

@@ -27,7 +27,9 @@ use crate::error::{DataError, DataResult};
 use crate::frames::BodyFromCamera;
 use crate::metrics::align::Alignment;
 use crate::metrics::pixel::{pooled_rmse_px, subset_rmse_px};
-use crate::result::{DatasetPart, PixelPart, PointName, ResultDocument, SCHEMA, Settings, Skip, TrajectoryPart};
+use crate::result::{
+    DatasetPart, PixelPart, PointName, ResultDocument, SCHEMA, Settings, Skip, TrajectoryPart,
+};
 use crate::time::{Span, Stamp};
 use crate::trajectory::NoPose;
 

@@ -63,7 +63,9 @@ impl<'a> Selection<'a> {
         camera: &Camera,
         window: &Window,
     ) -> Result<Self, EvaluateError> {
-        let (Some(first), Some(last)) = (frames.first(), frames.last()) else { return Err(EvaluateError::NoFrames) };
+        let (Some(first), Some(last)) = (frames.first(), frames.last()) else {
+            return Err(EvaluateError::NoFrames);
+        };
         if labels.observation_count() == 0 {
             return Err(EvaluateError::NoLabels);
         }
@@ -73,7 +75,8 @@ impl<'a> Selection<'a> {
         let mut used = BTreeSet::new();
         let mut at_a_frame = false;
         for point in labels.points() {
-            let mut selected = SelectedPoint { name: point.name.as_str().into(), segments: vec![], skips: vec![] };
+            let mut selected =
+                SelectedPoint { name: point.name.as_str().into(), segments: vec![], skips: vec![] };
             for observation in point.before_first_keyframe() {
                 at_a_frame |= frames.binary_search(&observation.stamp).is_ok();
                 if kept.covers(observation.stamp) {
@@ -93,7 +96,9 @@ impl<'a> Selection<'a> {
                     match (frame, keyframe) {
                         (None, _) => selected.skips.push((observation.stamp, SkipReason::NoFrame)),
                         (Some(frame), _) if !kept.has(frame) => {}
-                        (Some(_), None) => selected.skips.push((observation.stamp, SkipReason::KeyframeNoFrame)),
+                        (Some(_), None) => {
+                            selected.skips.push((observation.stamp, SkipReason::KeyframeNoFrame))
+                        }
                         (Some(_), _) if observation.occluded => {
                             selected.skips.push((observation.stamp, SkipReason::Occluded));
                         }
@@ -223,7 +228,8 @@ mod tests {
 
     fn kept(millis: &[i64], fps: f64, duration_ms: Option<i64>) -> Vec<usize> {
         let frames: Vec<Stamp> = millis.iter().map(|m| Stamp::from_nanos(m * 1_000_000)).collect();
-        let window = Window { fps: Some(fps), start: Span::ZERO, duration: duration_ms.map(Span::from_millis) };
+        let window =
+            Window { fps: Some(fps), start: Span::ZERO, duration: duration_ms.map(Span::from_millis) };
         KeptFrames::new(&frames, &window).ticked.unwrap().into_iter().collect()
     }
 

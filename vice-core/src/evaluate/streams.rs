@@ -3,7 +3,8 @@
 use super::EvaluateError;
 use crate::frames::WorldFromBody;
 use crate::metrics::align::{Alignment, align};
-use crate::metrics::trajectory::seed_metrics;
+use crate::metrics::associate::PosePairs;
+use crate::metrics::trajectory::Summary;
 use crate::result::{Role, TrajectoryPart};
 use crate::time::{Span, Stamp, suspect_unit};
 use crate::trajectory::{NoPose, Trajectory};
@@ -45,31 +46,29 @@ pub(super) fn compare(
     max_gap: Span,
     alignment: Alignment,
 ) -> TrajectoryPart {
-    let pairs: Vec<(WorldFromBody, WorldFromBody)> = stamps
-        .iter()
-        .filter_map(|stamp| {
-            let reference = reference.trajectory.pose_at(*stamp, max_gap).ok()?;
-            Some((reference, estimate.trajectory.pose_at(*stamp, max_gap).ok()?))
-        })
-        .collect();
-    let (references, estimates): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
+    let at_both = stamps.iter().filter_map(|stamp| {
+        let pose = reference.trajectory.pose_at(*stamp, max_gap).ok()?;
+        Some((*stamp, pose, estimate.trajectory.pose_at(*stamp, max_gap).ok()?))
+    });
+    let at_both: Vec<_> = at_both.collect();
     let mut part = TrajectoryPart {
         estimate: estimate.name.clone(),
         reference: reference.name.clone(),
         align: alignment.name().to_string(),
-        matched: references.len(),
+        matched: at_both.len(),
         rmse_3d_m: None,
         aoe_rad: None,
         roe_rad: None,
         problem: None,
     };
-    match align(&references, &estimates, alignment, None) {
-        Ok(aligned) => {
-            let moved: Vec<WorldFromBody> = estimates.iter().map(|pose| aligned.apply(pose)).collect();
-            let metrics = seed_metrics(&references, &moved);
-            part.rmse_3d_m = metrics.rmse_3d_m;
-            part.aoe_rad = metrics.aoe_rad;
-            part.roe_rad = metrics.roe_rad;
+    let summary = PosePairs::new(at_both)
+        .and_then(|pairs| Ok(align(&pairs, alignment, None)?.apply_to(&pairs)))
+        .and_then(|aligned| Summary::of(&aligned));
+    match summary {
+        Ok(summary) => {
+            part.rmse_3d_m = Some(summary.rmse_3d_m);
+            part.aoe_rad = Some(summary.aoe_rad);
+            part.roe_rad = summary.roe_rad;
         }
         Err(error) => part.problem = Some(error.to_string()),
     }

@@ -1,0 +1,9 @@
+//! How far a pose stream is off: in pixels, and against a reference trajectory.
+
+pub mod align;
+pub mod associate;
+pub mod pixel;
+pub mod plane;
+pub mod rotation_offset;
+pub mod rpe;
+pub mod trajectory;
