@@ -1,1 +1,20 @@
-//! Not written yet.
+//! Files that every format of VICE shares, and the one way anything is written.
+//!
+//! | module | what |
+//! | --- | --- |
+//! | [`trajectory`] | poses as TUM, EuRoC, KITTI and relative motions; found out by content |
+//! | [`labels`] | labels as CSV, JSON `vice.labels/1`, and the pickle of the paper's authors |
+//! | [`calibration`] | TOML or Kalibr files that override intrinsics and extrinsics |
+//! | [`rigid_file`] | the place of an estimate's frame in the body |
+//! | [`image_file`] | PNG and JPEG |
+//! | [`rows`], [`yaml`] | text in rows, and YAML with OpenCV's dialect |
+//! | [`paths`] | names from files, kept below their folder |
+//! | [`atomic`] | writing all or nothing |
+#![forbid(unsafe_code)]
+
+pub mod atomic;
+pub mod image_file;
+pub mod paths;
+pub mod rows;
+pub mod trajectory;
+pub mod yaml;

@@ -1,0 +1,107 @@
+//! YAML as robots write it, OpenCV's dialect included.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use serde::de::DeserializeOwned;
+use vice_core::error::{DataError, DataResult};
+
+/// Bytes beyond which a description file is refused.
+const MAX_BYTES: u64 = 4 << 20;
+
+/// Reads a YAML file.
+///
+/// # Errors
+/// [`DataError`] with path and line if the file cannot be read, is too large, or is not what `T` wants.
+pub fn read<T: DeserializeOwned>(path: impl AsRef<Path>) -> DataResult<T> {
+    let path = path.as_ref();
+    parse(&read_text(path)?).map_err(|e| e.at(path))
+}
+
+/// Reads YAML text, OpenCV's dialect included: a first line `%YAML:1.0`, and matrices tagged `!!opencv-matrix`.
+///
+/// # Errors
+/// [`DataError`] with the line if the text is not what `T` wants.
+pub fn parse<T: DeserializeOwned>(text: &str) -> DataResult<T> {
+    let text = text.trim_start_matches('\u{feff}');
+    // Made comments or blanks, not cut out, so that lines keep their numbers. `%YAML:1.0` is no directive of YAML.
+    let text = if text.starts_with("%YAML") { format!("#{text}") } else { text.to_string() };
+    let text = text.replace("!!opencv-matrix", "                ");
+    serde_saphyr::from_str(&text).map_err(|e| {
+        let error = DataError::new(format!("is not the YAML expected: {}", first_line(&e.to_string())));
+        match e.location() {
+            Some(at) if at.line() > 0 => error.line(at.line()),
+            _ => error,
+        }
+    })
+}
+
+/// The text of a small file, decoded as UTF-8.
+pub(crate) fn read_text(path: &Path) -> DataResult<String> {
+    let failed = |e: std::io::Error| match e.kind() {
+        std::io::ErrorKind::NotFound => DataError::new("no such file").at(path),
+        std::io::ErrorKind::InvalidData => DataError::new("is not text").at(path),
+        _ => DataError::new("cannot be read").at(path).because(e),
+    };
+    let mut text = String::new();
+    File::open(path).map_err(failed)?.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(failed)?;
+    if text.len() as u64 > MAX_BYTES {
+        return Err(DataError::new("is larger than 4 MiB, which no description of a sensor is").at(path));
+    }
+    if text.trim().is_empty() {
+        return Err(DataError::new("the file is empty").at(path));
+    }
+    Ok(text)
+}
+
+fn first_line(text: &str) -> &str {
+    text.lines().next().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Deserialize;
+
+    #[derive(Debug, Deserialize)]
+    struct Sensor {
+        rate_hz: f64,
+        #[serde(rename = "T_BS")]
+        t_bs: Matrix,
+    }
+
+    #[derive(Debug, Deserialize)]
+    struct Matrix {
+        data: Vec<f64>,
+    }
+
+    #[test]
+    fn the_dialect_of_opencv_is_read() {
+        for head in
+            ["%YAML:1.0\n", "%YAML:1.0\n---\n", "%YAML:1.0\r\n", "\u{feff}%YAML 1.0\n---\n", "---\n", ""]
+        {
+            let text = format!(
+                "{head}# comment\nrate_hz: 20\nT_BS: !!opencv-matrix\n   rows: 1\n   cols: 2\n   dt: d\n   data: [ 1., -2.5e-3,\n      0 ]\n"
+            );
+            let sensor: Sensor = parse(&text).unwrap_or_else(|e| panic!("{head:?}: {e}"));
+            assert_eq!((sensor.rate_hz, sensor.t_bs.data), (20.0, vec![1.0, -0.0025, 0.0]));
+        }
+    }
+
+    #[test]
+    fn errors_name_the_line() {
+        let error = parse::<Sensor>("%YAML:1.0\nrate_hz: fast\nT_BS: {data: []}\n").unwrap_err();
+        assert_eq!(error.place(), Some(vice_core::error::Place::Line(2)), "{error}");
+        assert!(!error.to_string().contains('\n'), "{error}");
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("sensor.yaml");
+        assert!(read::<Sensor>(&path).unwrap_err().to_string().contains("no such file"));
+        std::fs::write(&path, b" \n").unwrap();
+        assert!(read::<Sensor>(&path).unwrap_err().to_string().contains("is empty"));
+        std::fs::write(&path, [0xff, 0xfe, 0]).unwrap();
+        assert!(read::<Sensor>(&path).unwrap_err().to_string().contains("not text"));
+        std::fs::write(&path, vec![b'#'; 5 << 20]).unwrap();
+        assert!(read::<Sensor>(&path).unwrap_err().to_string().contains("larger than"));
+    }
+}
