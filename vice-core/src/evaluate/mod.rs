@@ -386,3 +386,6 @@ fn trajectory_parts(evaluation: &Evaluation<'_>) -> Vec<TrajectoryPart> {
 fn skip(point: &PointName, stamp: Stamp, reason: SkipReason) -> Skip {
     Skip { point: point.clone(), timestamp_ns: stamp, reason: reason.name().to_string() }
 }
+
+#[cfg(test)]
+mod tests;
