@@ -2,3 +2,5 @@
 #![allow(missing_docs)]
 
 mod camera_oracle;
+mod depth_oracle;
+mod trajectory_oracle;
