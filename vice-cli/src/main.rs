@@ -1,1 +1,42 @@
-fn main() {}
+//! `vice`: whether a robot's ego-pose can be trusted, seen with its own camera.
+#![forbid(unsafe_code)]
+
+mod arguments;
+mod commands;
+mod formats;
+mod inputs;
+mod report;
+mod terminal;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use arguments::{Cli, Command};
+use terminal::{Outcome, UsageError};
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let verbosity = terminal::Verbosity::new(cli.quiet, cli.verbose);
+    terminal::show_warnings(verbosity);
+    let outcome = match &cli.command {
+        Command::Demo(args) => commands::demo::run(args, verbosity),
+        Command::Evaluate(args) => commands::evaluate::run(args, verbosity),
+        Command::Trajectory(args) => commands::trajectory::run(args),
+        Command::Info(args) => commands::info::run(args),
+        Command::Formats => commands::formats::run(),
+        Command::Synth(args) => commands::synth::run(args, verbosity),
+        Command::Labels(args) => commands::labels::run(args),
+        Command::Convert(args) => commands::convert::run(args),
+        Command::Completions(args) => commands::completions::run(args),
+    };
+    match outcome {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::TooManySkips) => ExitCode::from(3),
+        Err(error) if terminal::is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            terminal::print_error(&error);
+            ExitCode::from(if error.is::<UsageError>() { 2 } else { 1 })
+        }
+    }
+}

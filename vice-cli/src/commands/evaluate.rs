@@ -1,0 +1,207 @@
+//! `vice evaluate`: the main job.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use vice_core::dataset::{Floor, Plane};
+use vice_core::depth::DepthSource;
+use vice_core::evaluate::{EvaluateError, Evaluation, Selection, evaluate};
+use vice_core::frames::World;
+use vice_core::metrics::align::Alignment;
+use vice_core::result::{ResultDocument, Settings};
+use vice_files::calibration::CalibrationFile;
+
+use crate::inputs::{DatasetArgs, LabelArgs, StreamArgs, depth_sources, load_streams, numbers, split_list, write_text};
+use crate::report;
+use crate::terminal::{self, Outcome, Verbosity, usage};
+
+/// Arguments of `vice evaluate`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    vice evaluate V1_01_easy --labels floor.csv --estimate imu-euler,openvins.txt --depth floor,zmap\n  \
+    vice evaluate my_run --labels labels.json --estimate rel:odometry.txt --reference none --json out.json\n\n\
+    Lists repeat the option or take commas. Estimates are names of the data set's streams, `imu-euler` (Euler\n\
+    integration of its IMU from the reference state at the first key frame), or files: TUM, EuRoC CSV, KITTI with a\n\
+    times file, and relative motions as rel:FILE.")]
+pub(crate) struct Args {
+    #[command(flatten)]
+    dataset: DatasetArgs,
+    #[command(flatten)]
+    labels: LabelArgs,
+    #[command(flatten)]
+    streams: StreamArgs,
+    #[command(flatten)]
+    depth: DepthArgs,
+    #[command(flatten)]
+    scoring: ScoringArgs,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+/// Where depth at key frames comes from.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Depth")]
+pub(crate) struct DepthArgs {
+    /// Depth sources: floor, zmap, zcam, mesh [default: floor].
+    #[arg(long, value_name = "SOURCE,...")]
+    pub(crate) depth: Vec<String>,
+    /// Floor plane n·p + d = 0 in the world, instead of the data set's.
+    #[arg(long, value_name = "NX,NY,NZ,D", allow_hyphen_values = true, value_parser = numbers::<4>)]
+    pub(crate) floor_plane: Option<[f64; 4]>,
+    /// Whether the Z-map leaves out cloud points that are hidden; off reproduces the paper.
+    #[arg(long, value_name = "on|off", default_value = "on", value_parser = on_off)]
+    pub(crate) zmap_occlusion: bool,
+    /// Calibration that overrides the data set's: TOML, or a Kalibr camchain.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) calibration: Option<PathBuf>,
+}
+
+/// How it is scored.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Scoring")]
+struct ScoringArgs {
+    /// Numbers of points whose subsets are averaged over [default: those up to 3 that exist].
+    #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..))]
+    subsets: Vec<u16>,
+    /// Alignment of the trajectory errors: none, first-pose, yaw, se3, sim3.
+    #[arg(long, value_name = "HOW", default_value = "se3")]
+    align: Alignment,
+    /// Exit with 3 if more labels than this could not be scored, percent.
+    #[arg(long, value_name = "PERCENT", default_value = "10", value_parser = percent)]
+    max_skipped: f64,
+}
+
+/// What is written beside the table.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Output")]
+struct OutputArgs {
+    /// Which samples the JSON lists.
+    #[arg(long, value_name = "all|none", default_value = "all", value_parser = ["all", "none"])]
+    samples: String,
+    /// Result document, vice.result/1.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// The table as CSV.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// The table as LaTeX.
+    #[arg(long, value_name = "FILE")]
+    latex: Option<PathBuf>,
+}
+
+fn on_off(text: &str) -> Result<bool, String> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err("expected on or off".to_string()),
+    }
+}
+
+fn percent(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..=100.0).contains(&value) => Ok(value),
+        _ => Err("expected a number from 0 to 100".to_string()),
+    }
+}
+
+pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
+    let document = document(args, verbosity)?;
+    // All texts are made before the first is written, so that a failure leaves nothing half done.
+    let json = args.output.json.as_ref().map(|path| Ok::<_, anyhow::Error>((path, to_json(&document)?))).transpose()?;
+    let csv = args.output.csv.as_ref().map(|path| report::csv::render(&document).map(|t| (path, t))).transpose()?;
+    let latex =
+        args.output.latex.as_ref().map(|path| report::latex::render(&document).map(|t| (path, t))).transpose()?;
+    for (path, text) in [json, csv, latex].into_iter().flatten() {
+        write_text(path, &text)?;
+    }
+    terminal::print(&report::table::render(&document))?;
+    let worst = document.worst_skipped_percent();
+    if worst > args.scoring.max_skipped {
+        verbosity.note(&format!(
+            "{worst:.1} % of the labels of a stream could not be scored, more than --max-skipped {} allows",
+            args.scoring.max_skipped
+        ));
+        return Ok(Outcome::TooManySkips);
+    }
+    Ok(Outcome::Done)
+}
+
+fn to_json(document: &ResultDocument) -> anyhow::Result<String> {
+    let mut text = serde_json::to_string(document).context("cannot make the JSON")?;
+    text.push('\n');
+    Ok(text)
+}
+
+fn document(args: &Args, verbosity: Verbosity) -> anyhow::Result<ResultDocument> {
+    let calibration = args.depth.calibration.as_ref().map(CalibrationFile::read).transpose()?;
+    let dataset = args.dataset.open()?;
+    let used = args.dataset.used_camera(dataset.as_ref(), calibration.as_ref())?;
+    let labels = args.labels.read(&used.frames)?;
+    let window = args.labels.window();
+    let in_labels = |error: EvaluateError| match error {
+        EvaluateError::Data(error) => anyhow::Error::new(error),
+        error => anyhow::Error::new(error).context(args.labels.labels.display().to_string()),
+    };
+    let selection = Selection::new(&labels, &used.frames, &used.camera, &window).map_err(in_labels)?;
+    let subsets: Vec<usize> = args.scoring.subsets.iter().map(|n| usize::from(*n)).collect();
+    if let Some(asked) = subsets.iter().find(|n| **n > selection.point_count()) {
+        let points = selection.point_count();
+        return Err(usage(EvaluateError::SubsetTooLarge { asked: *asked, points }.to_string()));
+    }
+    let streams = load_streams(&args.streams, dataset.as_ref(), &used, &selection, calibration.as_ref())?;
+    let floor = match args.depth.floor_plane {
+        Some([nx, ny, nz, d]) => {
+            let plane = Plane::<World>::new([nx, ny, nz], d).map_err(|e| usage(format!("--floor-plane: {e}")))?;
+            Some(Floor::World(plane))
+        }
+        None => None,
+    };
+    let sources = depth_sources(&args.depth, &dataset, &used.name)?;
+    let sources: Vec<&dyn DepthSource> = sources.iter().map(AsRef::as_ref).collect();
+    let settings = Settings {
+        labels: args.labels.labels.display().to_string(),
+        points: labels.points().iter().map(|p| p.name.clone()).collect(),
+        fps: args.labels.fps,
+        start_s: args.labels.start.as_secs_f64(),
+        duration_s: args.labels.duration.map(|d| d.as_secs_f64()),
+        max_gap_s: args.streams.max_gap.as_secs_f64(),
+        time_offset_s: streams.time_offset.as_secs_f64(),
+        align: args.scoring.align.name().to_string(),
+        anchor: streams.list[streams.anchor].name.clone(),
+        calibration: args.depth.calibration.as_ref().map(|p| p.display().to_string()),
+        floor_plane: args.depth.floor_plane,
+        zmap_occlusion: args.depth.zmap_occlusion,
+        estimate_frame: args.streams.estimate_frame.clone(),
+        other: args.dataset.settings.iter().map(|(k, v)| (format!("set {k}"), v.clone())).collect(),
+    };
+    let evaluation = Evaluation {
+        dataset: dataset.as_ref(),
+        camera_name: &used.name,
+        camera: &used.camera,
+        body_from_camera: used.body_from_camera,
+        frames: &used.frames,
+        selection: &selection,
+        streams: &streams.list,
+        anchor: streams.anchor,
+        depths: &sources,
+        floor,
+        max_gap: args.streams.max_gap,
+        subsets: (!subsets.is_empty()).then_some(subsets.as_slice()),
+        align: args.scoring.align,
+        keep_samples: args.output.samples == "all",
+        settings,
+    };
+    let bar = verbosity.progress("evaluating");
+    let document = evaluate(&evaluation, &|done, total| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+    })?;
+    bar.finish_and_clear();
+    Ok(document)
+}
+
+/// The depth sources that are asked for, `floor` where none is.
+pub(crate) fn depth_names(args: &DepthArgs) -> Vec<String> {
+    let names = split_list(&args.depth);
+    if names.is_empty() { vec!["floor".to_string()] } else { names }
+}

@@ -1,0 +1,74 @@
+//! `vice labels`.
+
+use std::path::{Path, PathBuf};
+
+use vice_files::atomic::Overwrite;
+use vice_files::labels;
+
+use crate::inputs::DatasetArgs;
+use crate::terminal::{self, Outcome, usage};
+
+/// What to do with labels.
+#[derive(Debug, clap::Subcommand)]
+pub(crate) enum Command {
+    /// Convert labels between CSV and JSON, or from the authors' pickle.
+    Convert(ConvertArgs),
+}
+
+/// Arguments of `vice labels convert`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  vice labels convert floor.csv floor.json\n  \
+    vice labels convert labels.pickle labels.csv --dataset V1_01_easy\n\n\
+    The pickle counts frames; the data set says which stamps they have.")]
+pub(crate) struct ConvertArgs {
+    /// Labels to read: CSV, JSON (vice.labels/1) or the authors' pickle.
+    #[arg(value_name = "IN")]
+    input: PathBuf,
+    /// File to write, .csv or .json.
+    #[arg(value_name = "OUT")]
+    output: PathBuf,
+    /// Data set whose frames a pickle counts.
+    #[arg(long, value_name = "DATASET")]
+    dataset: Option<PathBuf>,
+    /// Camera of that data set [default: the first].
+    #[arg(long, value_name = "NAME")]
+    camera: Option<String>,
+    /// Replace a file that exists.
+    #[arg(long)]
+    force: bool,
+}
+
+pub(crate) fn run(command: &Command) -> anyhow::Result<Outcome> {
+    match command {
+        Command::Convert(args) => convert(args),
+    }
+}
+
+fn convert(args: &ConvertArgs) -> anyhow::Result<Outcome> {
+    let frames = match &args.dataset {
+        Some(path) => {
+            let open = DatasetArgs { path: path.clone(), format: None, settings: vec![], camera: args.camera.clone() };
+            let dataset = open.open()?;
+            let camera = open.camera_name(dataset.as_ref())?;
+            Some((dataset.name().to_string(), camera.clone(), dataset.frames(&camera)?))
+        }
+        None => None,
+    };
+    let mut set = labels::read(&args.input, frames.as_ref().map(|(_, _, f)| f.as_ref()))?;
+    if let Some((dataset, camera, _)) = frames {
+        set.dataset.get_or_insert(dataset);
+        set.camera.get_or_insert(camera);
+    }
+    let overwrite = if args.force { Overwrite::Replace } else { Overwrite::Refuse };
+    match extension(&args.output).as_deref() {
+        Some("csv") => labels::write_csv(&args.output, &set, overwrite)?,
+        Some("json") => labels::write_json(&args.output, &set, overwrite)?,
+        _ => return Err(usage(format!("{}: the name must end in .csv or .json", args.output.display()))),
+    }
+    terminal::print(&format!("{} points, {} observations\n", set.points().len(), set.observation_count()))?;
+    Ok(Outcome::Done)
+}
+
+fn extension(path: &Path) -> Option<String> {
+    path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase)
+}

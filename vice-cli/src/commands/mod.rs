@@ -1,0 +1,11 @@
+//! One file a command.
+
+pub(crate) mod completions;
+pub(crate) mod convert;
+pub(crate) mod demo;
+pub(crate) mod evaluate;
+pub(crate) mod formats;
+pub(crate) mod info;
+pub(crate) mod labels;
+pub(crate) mod synth;
+pub(crate) mod trajectory;

@@ -1,0 +1,56 @@
+//! The table as CSV, one line for each stream, depth source and subset size.
+
+use anyhow::Context;
+use vice_core::result::ResultDocument;
+
+/// Columns: stream, role, depth, points, mean_px, std_px, subsets, pooled_px, scored, skipped, and the trajectory
+/// errors of estimates.
+pub(crate) fn render(document: &ResultDocument) -> anyhow::Result<String> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record([
+        "stream", "role", "depth", "points", "mean_px", "std_px", "subsets", "pooled_px", "scored", "skipped",
+        "rmse_3d_m", "aoe_rad", "roe_rad",
+    ])?;
+    let number = |v: Option<f64>| v.map_or_else(String::new, |v| v.to_string());
+    for part in &document.pixel {
+        let trajectory = document.trajectory.iter().find(|t| t.estimate == part.stream);
+        for (size, rmse) in &part.rmse_px {
+            writer.write_record([
+                cell(&part.stream),
+                format!("{:?}", part.role).to_lowercase(),
+                cell(&part.depth),
+                size.to_string(),
+                number(rmse.map(|r| r.mean)),
+                number(rmse.map(|r| r.std)),
+                rmse.map_or_else(String::new, |r| r.subsets.to_string()),
+                number(part.pooled_rmse_px),
+                part.scored.to_string(),
+                part.skipped.len().to_string(),
+                number(trajectory.and_then(|t| t.rmse_3d_m)),
+                number(trajectory.and_then(|t| t.aoe_rad)),
+                number(trajectory.and_then(|t| t.roe_rad)),
+            ])?;
+        }
+    }
+    let bytes = writer.into_inner().map_err(|e| e.into_error()).context("cannot make the CSV")?;
+    Ok(String::from_utf8(bytes)?)
+}
+
+/// Text from data that a spreadsheet would take for a formula is kept from being one.
+fn cell(text: &str) -> String {
+    if text.starts_with(['=', '+', '-', '@']) && text.parse::<f64>().is_err() {
+        format!("'{text}")
+    } else {
+        text.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_formula_is_not_run() {
+        assert_eq!(super::cell("=1+1"), "'=1+1");
+        assert_eq!(super::cell("-1.5"), "-1.5");
+        assert_eq!(super::cell("imu-euler"), "imu-euler");
+    }
+}

@@ -1,0 +1,7 @@
+//! Result documents as text: the paper's table, CSV and LaTeX.
+
+pub(crate) mod csv;
+pub(crate) mod latex;
+pub(crate) mod overlay;
+pub(crate) mod rows;
+pub(crate) mod table;

@@ -1,0 +1,71 @@
+//! The paper's table as rows: one for each estimate and depth source, with the reference beside it.
+
+use vice_core::result::{PixelPart, ResultDocument, Role, TrajectoryPart};
+
+/// A row: what the estimate's own error is, and what the labels say of the reference and of the estimate.
+pub(crate) struct Row<'a> {
+    /// Name of the estimate; of the reference where there is no estimate.
+    pub(crate) stream: &'a str,
+    pub(crate) depth: &'a str,
+    pub(crate) trajectory: Option<&'a TrajectoryPart>,
+    pub(crate) reference: Option<&'a PixelPart>,
+    pub(crate) estimate: Option<&'a PixelPart>,
+}
+
+/// Rows in the order of the estimates, then of the depth sources.
+pub(crate) fn rows(document: &ResultDocument) -> Vec<Row<'_>> {
+    let of = |role| document.pixel.iter().filter(move |p| p.role == role);
+    let mut streams: Vec<&str> = Vec::new();
+    for part in of(Role::Estimate) {
+        if !streams.contains(&part.stream.as_str()) {
+            streams.push(&part.stream);
+        }
+    }
+    let mut rows = Vec::new();
+    for stream in streams {
+        for estimate in of(Role::Estimate).filter(|p| p.stream == stream) {
+            rows.push(Row {
+                stream,
+                depth: &estimate.depth,
+                trajectory: document.trajectory.iter().find(|t| t.estimate == stream),
+                reference: of(Role::Reference).find(|p| p.depth == estimate.depth),
+                estimate: Some(estimate),
+            });
+        }
+    }
+    if rows.is_empty() {
+        rows.extend(of(Role::Reference).map(|reference| Row {
+            stream: &reference.stream,
+            depth: &reference.depth,
+            trajectory: None,
+            reference: Some(reference),
+            estimate: None,
+        }));
+    }
+    rows
+}
+
+/// The subset sizes that occur, ascending.
+pub(crate) fn sizes(document: &ResultDocument) -> Vec<usize> {
+    let mut sizes: Vec<usize> = document.pixel.iter().flat_map(|p| p.rmse_px.keys().copied()).collect();
+    sizes.sort_unstable();
+    sizes.dedup();
+    sizes
+}
+
+/// `mean±std` of a subset size.
+pub(crate) fn mean_and_deviation(part: Option<&PixelPart>, size: usize, plus_minus: &str) -> Option<String> {
+    let rmse = part?.rmse_px.get(&size)?.as_ref()?;
+    Some(format!("{:.*}{plus_minus}{:.*}", decimals(rmse.mean), rmse.mean, decimals(rmse.mean), rmse.std))
+}
+
+/// Enough decimals to see a good estimate, not more than labels are good for.
+pub(crate) fn decimals(px: f64) -> usize {
+    if px < 0.1 {
+        4
+    } else if px < 10.0 {
+        2
+    } else {
+        1
+    }
+}
