@@ -13,8 +13,11 @@
 #![forbid(unsafe_code)]
 
 pub mod atomic;
+pub mod calibration;
 pub mod image_file;
+pub mod labels;
 pub mod paths;
+pub mod rigid_file;
 pub mod rows;
 pub mod trajectory;
 pub mod yaml;
