@@ -2,5 +2,7 @@
 #![allow(missing_docs)]
 
 mod camera_oracle;
+mod euroc_oracle;
+mod evaluate_oracle;
 mod depth_oracle;
 mod trajectory_oracle;
