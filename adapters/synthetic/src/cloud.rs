@@ -31,9 +31,8 @@ pub(crate) fn sample(scene: &Scene, spacing_m: f64) -> Arc<[Point3<f32>]> {
                 let point = face.corner + face.right * s + face.up * t;
                 let covered =
                     |(i, solid): (usize, &crate::scene::Solid)| i != own && i != 0 && solid.covers(&point);
-                if !scene.solids.iter().enumerate().any(covered)
-                    && !(face.kind == SurfaceKind::Box && point.z < 1e-6)
-                {
+                let below_box = face.kind == SurfaceKind::Box && point.z < 1e-6;
+                if !below_box && !scene.solids.iter().enumerate().any(covered) {
                     points.push(point.cast::<f32>());
                 }
             }

@@ -309,3 +309,90 @@ fn camera(options: &SyntheticOptions) -> DataResult<Camera> {
     Camera::new(options.width, options.height, fx_fy_cx_cy, Model::Radtan(lens))
         .map_err(|e| DataError::new("the camera of the synthetic flight").because(e))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use vice_core::frames::rotation_angle_rad;
+    use vice_core::imu::{GRAVITY_Z_UP_M_S2, integrate_euler};
+
+    fn small(seed: u64) -> Synthetic {
+        Synthetic::new(SyntheticOptions { seed, width: 160, height: 120, ..Default::default() }).unwrap()
+    }
+
+    #[test]
+    fn the_inertial_samples_integrate_to_the_truth() {
+        for seed in 0..3 {
+            let synthetic = small(seed);
+            for start_s in [0_i64, 4] {
+                let from = synthetic.options().start + Span::from_millis(start_s * 1000);
+                let to = from + Span::from_millis(2000);
+                let start = synthetic.inertial_state(from).unwrap().unwrap();
+                assert!(start.velocity_m_s.norm() > 0.4, "it flies from the first frame on");
+                let imu = synthetic.imu().unwrap();
+                let integrated = integrate_euler(&imu, &start, to, GRAVITY_Z_UP_M_S2).unwrap();
+                assert_eq!(integrated.end(), to);
+                let (got, truth) =
+                    (integrated.poses()[integrated.len() - 1], synthetic.state(to).world_from_body);
+                // Held samples lag by half a period, 2.5 ms: millimetres and a tenth of a degree in two seconds.
+                let off = (got.translation() - truth.translation()).norm();
+                let turned = rotation_angle_rad(&(got.rotation().inverse() * truth.rotation()));
+                assert!(off < 0.05 && turned < 0.005, "seed {seed}: {off} m, {turned} rad");
+            }
+        }
+    }
+
+    #[test]
+    fn finer_samples_come_closer() {
+        let after_two_seconds = |imu_rate_hz| {
+            let options = SyntheticOptions { width: 160, height: 120, imu_rate_hz, ..Default::default() };
+            let synthetic = Synthetic::new(options).unwrap();
+            let from = synthetic.options().start;
+            let start = synthetic.inertial_state(from).unwrap().unwrap();
+            let to = from + Span::from_millis(2000);
+            let imu = synthetic.imu().unwrap();
+            let last = integrate_euler(&imu, &start, to, GRAVITY_Z_UP_M_S2).unwrap();
+            (last.poses()[last.len() - 1].translation() - synthetic.state(to).world_from_body.translation())
+                .norm()
+        };
+        let (coarse, fine) = (after_two_seconds(200.0), after_two_seconds(2000.0));
+        assert!(fine < 0.15 * coarse, "the error is that of the integration: {coarse} m, {fine} m");
+    }
+
+    #[test]
+    fn every_frame_has_a_pose_of_its_own_in_every_stream_even_with_a_clock_that_is_off() {
+        let synthetic = small(1);
+        let frames = synthetic.frames(CAMERA).unwrap();
+        assert_eq!(frames.len(), 200);
+        for stream in synthetic.streams() {
+            let trajectory = synthetic.trajectory(&stream).unwrap();
+            for (index, stamp) in frames.iter().enumerate() {
+                let gap = if stream == "clock-offset" { Span::from_millis(10) } else { Span::ZERO };
+                let pose = trajectory.pose_at(*stamp, gap).unwrap();
+                if stream == GROUND_TRUTH || stream == "exact" {
+                    assert_eq!(pose * body_from_camera(), synthetic.world_from_camera(index));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_there_is_named() {
+        let synthetic = small(1);
+        assert!(synthetic.camera("cam1").unwrap_err().to_string().contains("known: cam0"));
+        assert!(synthetic.trajectory("svo").unwrap_err().to_string().contains("drift"));
+        assert!(synthetic.image(CAMERA, 200).unwrap_err().to_string().contains("no frame 200"));
+        assert!(synthetic.inertial_state(Stamp::from_nanos(0)).unwrap().is_none());
+    }
+
+    #[test]
+    fn equal_options_give_equal_flights_and_another_seed_another() {
+        let (a, b, c) = (small(4), small(4), small(5));
+        assert_eq!(a.truth(), b.truth());
+        assert_eq!(a.estimates(), b.estimates());
+        assert_eq!(a.points(), b.points());
+        assert_eq!(a.scene_labels().unwrap(), b.scene_labels().unwrap());
+        assert_ne!(a.truth(), c.truth());
+        assert_ne!(a.points(), c.points());
+    }
+}

@@ -156,3 +156,101 @@ impl Filmed<'_> {
         Ok(set)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::{CAMERA, Synthetic};
+    use crate::options::SyntheticOptions;
+    use vice_core::dataset::Dataset;
+    use vice_core::time::Span;
+
+    fn default_flight() -> Synthetic {
+        Synthetic::new(SyntheticOptions::default()).unwrap()
+    }
+
+    /// Equation 1 from the public interface alone: pixel and depth at the key frame, poses, pixel later.
+    #[test]
+    fn labels_are_what_the_true_poses_make_of_the_key_frame() {
+        let synthetic = default_flight();
+        let camera = synthetic.camera(CAMERA).unwrap();
+        let frames = synthetic.frames(CAMERA).unwrap();
+        let world_from_camera = |stamp: Stamp| {
+            let body = synthetic.trajectory("ground-truth").unwrap().pose_at(stamp, Span::ZERO).unwrap();
+            body * synthetic.body_from_camera(CAMERA, stamp).unwrap()
+        };
+        let mut compared = 0;
+        for labels in [synthetic.floor_labels().unwrap(), synthetic.scene_labels().unwrap()] {
+            for point in labels.points() {
+                assert!(point.before_first_keyframe().is_empty());
+                for segment in point.segments() {
+                    let key = world_from_camera(segment.keyframe.stamp);
+                    let ray = camera.unproject(segment.keyframe.px).unwrap();
+                    let eye = Point3::from(key.translation());
+                    let z_m = synthetic.scene().cast(&eye, &key.rotate(&ray)).unwrap().distance;
+                    let point_world = key.transform_point(&Point3::from(ray * z_m));
+                    for later in segment.rest {
+                        let pose = world_from_camera(later.stamp);
+                        let px = camera.project(&pose.inverse().transform_point(&point_world)).unwrap();
+                        assert!(px.distance_px(later.px) < 1e-9, "{px:?} {later:?}");
+                        assert!(frames.binary_search(&later.stamp).is_ok());
+                        compared += 1;
+                    }
+                }
+            }
+        }
+        assert!(compared > 1500, "{compared}");
+    }
+
+    #[test]
+    fn points_stay_a_while_in_every_frame_and_apart() {
+        for seed in 0..6 {
+            let synthetic = Synthetic::new(SyntheticOptions { seed, ..Default::default() }).unwrap();
+            let frames = synthetic.frames(CAMERA).unwrap();
+            for (labels, points) in
+                [(synthetic.floor_labels().unwrap(), 4), (synthetic.scene_labels().unwrap(), 6)]
+            {
+                assert_eq!(labels.points().len(), points);
+                for point in labels.points() {
+                    let seen = point.observations.len();
+                    assert!(seen * 10 >= frames.len() * 9, "seed {seed} point {}: {seen}", point.name);
+                    let segments = point.segments().count();
+                    // On the average a second or more between two respawns.
+                    assert!(segments <= 10, "seed {seed} point {}: {segments} segments", point.name);
+                }
+                for frame in frames.iter().step_by(40) {
+                    let now: Vec<Pixel> = labels
+                        .points()
+                        .iter()
+                        .flat_map(|p| p.observations.iter().filter(|o| o.stamp == *frame).map(|o| o.px))
+                        .collect();
+                    for (i, a) in now.iter().enumerate() {
+                        assert!(now[i + 1..].iter().all(|b| a.distance_px(*b) > 8.0), "seed {seed} {now:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_key_frame_is_on_its_surface_and_away_from_edges() {
+        let synthetic = default_flight();
+        let camera = synthetic.camera(CAMERA).unwrap();
+        let frames = synthetic.frames(CAMERA).unwrap();
+        let labels = synthetic.scene_labels().unwrap();
+        let kinds = [SurfaceKind::Floor, SurfaceKind::Box, SurfaceKind::Wall];
+        for point in labels.points() {
+            let kind = kinds[point.name.parse::<usize>().unwrap() % 3];
+            for segment in point.segments() {
+                let frame = frames.binary_search(&segment.keyframe.stamp).unwrap();
+                let pose = synthetic.world_from_camera(frame);
+                let eye = Point3::from(pose.translation());
+                for (du, dv) in [(0.0, 0.0), (5.0, 3.0), (-5.0, 3.0), (4.0, -5.0), (-4.0, -5.0)] {
+                    let px = Pixel::new(segment.keyframe.px.u + du, segment.keyframe.px.v + dv);
+                    let hit = synthetic.scene().cast(&eye, &pose.rotate(&camera.unproject(px).unwrap()));
+                    assert_eq!(synthetic.scene().kind(hit.unwrap().surface), kind);
+                }
+            }
+        }
+    }
+}

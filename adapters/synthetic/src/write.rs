@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -192,8 +192,8 @@ impl Folder {
                 w,
                 "ply\nformat binary_little_endian 1.0\ncomment surfaces of the synthetic room, metres\n"
             )?;
-            write!(w, "element vertex {}\n", points.len())?;
-            write!(w, "property float x\nproperty float y\nproperty float z\nend_header\n")?;
+            writeln!(w, "element vertex {}", points.len())?;
+            writeln!(w, "property float x\nproperty float y\nproperty float z\nend_header")?;
             for point in points.iter() {
                 for value in point.iter() {
                     w.write_all(&value.to_le_bytes())?;
@@ -228,4 +228,119 @@ fn scaled_focal_length(camera: &Camera, scale: f64) -> DataResult<Camera> {
     let model: Model = *camera.model();
     Camera::new(camera.width(), camera.height(), [fx * scale, fy * scale, cx, cy], model)
         .map_err(|e| DataError::new("the calibration with the wrong focal length").because(e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::SyntheticOptions;
+    use std::sync::Mutex;
+    use vice_files::image_file;
+    use vice_files::trajectory::{ReadOptions, read, read_spec};
+
+    fn small() -> Synthetic {
+        let options = SyntheticOptions {
+            width: 160,
+            height: 120,
+            duration_s: 1.0,
+            cloud_spacing_m: 0.1,
+            ..Default::default()
+        };
+        Synthetic::new(options).unwrap()
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let synthetic = small();
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("a/flight");
+        let told = Mutex::new(Vec::new());
+        write_euroc(&synthetic, &out, false, &|done, total| told.lock().unwrap().push((done, total)))
+            .unwrap();
+        let told = told.into_inner().unwrap();
+        assert!(told.len() == 21 && told.contains(&(20, 20)), "{told:?}");
+        let beside: Vec<_> =
+            fs::read_dir(out.parent().unwrap()).unwrap().map(|e| e.unwrap().file_name()).collect();
+        assert_eq!(beside, ["flight"], "nothing is left beside the folder");
+
+        let poses = |name: &str| read_spec(name, &ReadOptions::default()).unwrap();
+        let at = |name: &str| out.join(name).to_str().unwrap().to_string();
+        let truth = poses(&at("mav0/state_groundtruth_estimate0/data.csv"));
+        assert_eq!(truth.trajectory.stamps(), synthetic.truth().stamps());
+        assert_eq!(truth.inertial.unwrap()[3].gyro_bias_rad_s, synthetic.options().gyro_bias_rad_s);
+        for (name, estimate) in synthetic.estimates() {
+            let again = read(out.join(format!("estimates/{name}.txt")), &ReadOptions::default()).unwrap();
+            for ((s, p), (t, q)) in estimate.iter().zip(again.trajectory.iter()) {
+                assert_eq!((s, p.translation()), (t, q.translation()));
+                assert!(p.rotation().angle_to(&q.rotation()) < 1e-12);
+            }
+        }
+        let relative = poses(&format!("rel:{}", at("estimates/exact_relative.txt")));
+        assert_eq!(relative.trajectory.stamps(), synthetic.truth().stamps());
+        let labels = labels::read(out.join("labels/scene.csv"), None).unwrap();
+        let exact = synthetic.scene_labels().unwrap();
+        assert_eq!(labels.observation_count(), exact.observation_count());
+        for (a, b) in labels.points().iter().zip(exact.points()) {
+            let pixels = |p: &vice_core::label::PointLabels| {
+                p.observations.iter().map(|o| (o.stamp, o.px, o.keyframe)).collect::<Vec<_>>()
+            };
+            assert_eq!(pixels(a), pixels(b));
+        }
+        let (image, depth) = synthetic.frame(5).unwrap();
+        let name = image_name(depth.stamp);
+        assert_eq!(image_file::read(out.join("mav0/cam0/data").join(&name)).unwrap(), image);
+        let counts = image_file::read_bytes(out.join("mav0/depth0/data").join(&name)).unwrap();
+        let read_depth = image_file::decode_depth_png(&counts, depth.stamp, METRES_PER_COUNT).unwrap();
+        for (a, b) in read_depth.z_m().iter().zip(depth.z_m()) {
+            assert!((a - b).abs() < 0.000_11, "{a} {b}");
+        }
+        let ply = fs::read(out.join("mav0/pointcloud0/data.ply")).unwrap();
+        let n = synthetic.points().len();
+        let header = String::from_utf8_lossy(&ply[..ply.len() - 12 * n]).into_owned();
+        assert!(
+            header.contains(&format!("element vertex {n}\n")) && header.ends_with("end_header\n"),
+            "{header}"
+        );
+    }
+
+    #[test]
+    fn calibrations_have_their_flaw() {
+        let synthetic = small();
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("flight");
+        write_euroc(&synthetic, &out, false, &|_, _| ()).unwrap();
+        let read = |name: &str| CalibrationFile::read(out.join("calibration").join(name)).unwrap();
+        let camera = synthetic.camera(CAMERA).unwrap();
+        let (exact, extrinsic, focal) =
+            (read("exact.toml"), read("wrong_extrinsic.toml"), read("wrong_focal.toml"));
+        assert_eq!(exact.camera(CAMERA, None).unwrap().unwrap(), camera);
+        assert_eq!(extrinsic.camera(CAMERA, None).unwrap().unwrap(), camera);
+        let turn = exact
+            .body_from_camera(CAMERA)
+            .unwrap()
+            .rotation()
+            .angle_to(&extrinsic.body_from_camera(CAMERA).unwrap().rotation());
+        assert!((turn.to_degrees() - 2.0).abs() < 1e-6, "{turn}");
+        let scaled = focal.camera(CAMERA, None).unwrap().unwrap().fx_fy_cx_cy();
+        assert!((scaled[0] / camera.fx_fy_cx_cy()[0] - 1.03).abs() < 1e-12);
+        assert_eq!(scaled[2..], camera.fx_fy_cx_cy()[2..]);
+    }
+
+    #[test]
+    fn a_folder_that_holds_something_needs_force() {
+        let synthetic = small();
+        let folder = tempfile::tempdir().unwrap();
+        let notes = folder.path().join("notes.txt");
+        fs::write(&notes, "mine").unwrap();
+        let error = write_euroc(&synthetic, folder.path(), false, &|_, _| ()).unwrap_err().to_string();
+        assert!(error.contains("not empty"), "{error}");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing was written");
+        write_euroc(&synthetic, folder.path(), true, &|_, _| ()).unwrap();
+        write_euroc(&synthetic, folder.path(), true, &|_, _| ()).unwrap();
+        assert_eq!(fs::read_to_string(&notes).unwrap(), "mine");
+        assert!(folder.path().join("mav0/cam0/data.csv").is_file());
+        let in_the_way = notes.join("flight");
+        assert!(write_euroc(&synthetic, &in_the_way, false, &|_, _| ()).is_err());
+        assert!(write_euroc(&synthetic, &notes, true, &|_, _| ()).is_err());
+    }
 }
