@@ -72,7 +72,7 @@ fn any_frame_in_any_order_is_the_one_of_a_straight_decode() {
         let film = Film::open(&path, format, Ffmpeg::default()).unwrap();
         assert_eq!((film.frame_count(), film.size()), (FRAMES, (64, 48)));
         let mut order: Vec<usize> = vec![89, 0, 1, 2, 40, 39, 12, 11, 10, 9, 75, 80, 20, 29, 30, 31, 3, 88];
-        order.extend((0..40).map(|k| (k * 53 + 17) % FRAMES));
+        order.extend((0..12).map(|k| (k * 53 + 17) % FRAMES));
         for index in order {
             let image = film.frame(index).unwrap();
             assert!(image.data() == expected[index], "{encoder:?}: frame {index} is another one");
