@@ -101,7 +101,9 @@ impl Sequence {
     fn check_unit(&self, path: &Path, range: (Stamp, Stamp)) -> DataResult<()> {
         let camera = &self.cameras[0];
         match camera.listing().map(|l| (l.stamps.first().copied(), l.stamps.last().copied())) {
-            Ok((Some(first), Some(last))) => check_unit((path, range), (&camera.folder.join("data.csv"), (first, last))),
+            Ok((Some(first), Some(last))) => {
+                check_unit((path, range), (&camera.folder.join("data.csv"), (first, last)))
+            }
             _ => Ok(()),
         }
     }

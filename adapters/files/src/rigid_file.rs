@@ -135,7 +135,7 @@ mod tests {
         ];
         for form in forms {
             let rigid = form.unwrap();
-            assert_eq!(rigid.translation(), [0.5, -2.0, 0.3].into());
+            assert_eq!(rigid.translation(), nalgebra::Vector3::new(0.5, -2.0, 0.3));
             let x = rigid.rotate(&[1.0, 0.0, 0.0].into());
             assert!((x.y - 1.0).abs() < 1e-12);
         }

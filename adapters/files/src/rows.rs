@@ -243,9 +243,15 @@ impl<'a> Row<'a> {
     /// A stamp in nanoseconds.
     ///
     /// # Errors
-    /// [`DataError`] with the line if the field is no time.
+    /// [`DataError`] with the line if the field is no time, or has a fraction, as seconds have.
     pub fn nanos(&self, column: usize) -> DataResult<Stamp> {
         let text = self.required(column)?;
+        let fraction = text.split_once('.').map_or("", |(_, fraction)| fraction);
+        if fraction.bytes().all(|b| b.is_ascii_digit()) && fraction.bytes().any(|b| b != b'0') {
+            return Err(self
+                .error(format!("column {}: {text} is no whole number of nanoseconds", column + 1))
+                .hint("the stamps look like seconds or milliseconds; nanoseconds are expected here"));
+        }
         Stamp::parse_nanos(text).map_err(|e| self.no_time(column, text, e))
     }
 
@@ -357,12 +363,14 @@ mod tests {
         assert_eq!(row.micros(2).unwrap().as_nanos(), 1_403_715_273_262_142_000);
         let hint = |column| row.seconds(column).unwrap_err().to_string();
         assert!(hint(1).contains("nanoseconds") && hint(2).contains("microseconds"));
+        let seconds = row.nanos(0).unwrap_err().to_string();
+        assert!(seconds.contains("no whole number of nanoseconds"), "{seconds}");
         assert!(hint(3).contains("milliseconds") && hint(4).contains("`x` is no time stamp"));
     }
 
     #[test]
     fn a_line_without_end_takes_no_memory() {
-        let mut rows = Rows::new(std::io::BufReader::new(std::io::repeat(b'1')));
+        let mut rows = Rows::new(BufReader::new(std::io::repeat(b'1')));
         assert!(rows.next_row().unwrap_err().to_string().contains("64 KiB"));
         let mut rows = Rows::new(&b"1 2\n\xff\xfe\n"[..]);
         assert!(rows.next_row().is_ok());

@@ -1,6 +1,6 @@
 //! Labels as CSV. Columns are found by their names, in any order.
 
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 
 use vice_core::camera::Pixel;
 use vice_core::error::{DataError, DataResult};
@@ -18,17 +18,42 @@ const UNCERTAIN: &str = "uncertain";
 ///
 /// # Errors
 /// [`DataError`] with the line for a missing column, a field that cannot be read, and as [`LabelSet::from_rows`].
-pub fn read_csv(reader: impl Read) -> DataResult<LabelSet> {
-    let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(reader);
+pub fn read_csv(bytes: &[u8]) -> DataResult<LabelSet> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
+    let mut lines = Lines { bytes, counted: 0, line: 1 };
     let heading = csv.headers().map_err(|e| csv_error(&e))?.clone();
-    let columns = Columns::find(&heading)?;
+    let heading_line = lines.at_end_of_record(csv.position());
+    let columns = Columns::find(&heading).map_err(|e| e.line(heading_line))?;
     let mut rows = Vec::new();
     let mut record = csv::StringRecord::new();
-    while csv.read_record(&mut record).map_err(|e| csv_error(&e))? {
-        let line = record.position().map_or(0, csv::Position::line);
+    loop {
+        let read = csv.read_record(&mut record);
+        let line = lines.at_end_of_record(csv.position());
+        if !read.map_err(|e| csv_error(&e).line(line))? {
+            return labels_from(rows);
+        }
         rows.push(columns.row(&record, line).map_err(|e| e.line(line))?);
     }
-    labels_from(rows)
+}
+
+/// Counts lines. The reader's own count lags behind after comments, blank lines and CRLF.
+struct Lines<'a> {
+    bytes: &'a [u8],
+    counted: usize,
+    line: u64,
+}
+
+impl Lines<'_> {
+    /// The line on which the record ends that the reader has just passed.
+    fn at_end_of_record(&mut self, reader: &csv::Position) -> u64 {
+        let passed = usize::try_from(reader.byte()).unwrap_or(usize::MAX).min(self.bytes.len());
+        let record = self.bytes[..passed].trim_ascii_end();
+        let newlines = record.get(self.counted..).unwrap_or_default().iter().filter(|b| **b == b'\n').count();
+        self.line += newlines as u64;
+        self.counted = self.counted.max(record.len());
+        self.line
+    }
 }
 
 /// Writes all columns, points in natural order, observations in time order.
@@ -79,11 +104,10 @@ impl Columns {
         }
         let find = |name: &str| heading.iter().position(|column| column == name);
         let required = |name: &str| {
-            find(name)
-                .ok_or_else(|| DataError::new(format!("the column {name} is missing")).line(1).hint(expected))
+            find(name).ok_or_else(|| DataError::new(format!("the column {name} is missing")).hint(expected))
         };
         if let Some(twice) = known.iter().find(|n| heading.iter().filter(|c| c == *n).count() > 1) {
-            return Err(DataError::new(format!("the column {twice} appears twice")).line(1));
+            return Err(DataError::new(format!("the column {twice} appears twice")));
         }
         Ok(Self {
             point: required("point")?,
@@ -136,16 +160,11 @@ impl Columns {
 }
 
 fn csv_error(error: &csv::Error) -> DataError {
-    let line = error.position().map(csv::Position::line);
-    let problem = match error.kind() {
+    DataError::new(match error.kind() {
         csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
             format!("expected {expected_len} columns, found {len}")
         }
         csv::ErrorKind::Utf8 { .. } => "the line is not UTF-8 text".to_string(),
         _ => format!("cannot be read as CSV: {error}"),
-    };
-    match line {
-        Some(line) => DataError::new(problem).line(line),
-        None => DataError::new(problem),
-    }
+    })
 }

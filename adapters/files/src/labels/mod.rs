@@ -76,7 +76,7 @@ pub fn read(path: impl AsRef<Path>, frame_stamps: Option<&[Stamp]>) -> DataResul
     let path = path.as_ref();
     let bytes = read_bytes(path)?;
     let labels = match LabelFormat::of_content(&bytes) {
-        LabelFormat::Csv => read_csv(&bytes[..]),
+        LabelFormat::Csv => read_csv(&bytes),
         LabelFormat::Json => read_json(&bytes),
         LabelFormat::Pickle => match frame_stamps {
             Some(stamps) => read_pickle(&bytes, stamps),

@@ -3,6 +3,9 @@
 //! Python's own machine calls whatever function a pickle names. This one calls nothing: a name that is not on its list
 //! is an error. Values live in one flat list and refer to each other by index, so that neither deep nesting nor shared
 //! or circular references can exhaust the stack, and memory stays in proportion to the bytes read.
+//!
+//! The crate serde-pickle calls nothing either, but keeps only the last state of an object: the element type of an
+//! array is lost where it is first used, and what an array refers to twice comes back empty.
 
 use std::collections::BTreeMap;
 

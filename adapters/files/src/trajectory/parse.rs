@@ -29,18 +29,30 @@ pub enum Parsed {
 ///
 /// # Errors
 /// [`DataError`] with the line, as [`super::read`].
-pub fn read_rows<R: BufRead>(mut rows: Rows<R>) -> DataResult<Parsed> {
+pub fn read_rows<R: BufRead>(rows: Rows<R>) -> DataResult<Parsed> {
+    collect(rows, format_of)?.finish()
+}
+
+/// Reads rows in the ground-truth layout of EuRoC, whatever else they might be.
+pub(super) fn read_euroc_rows<R: BufRead>(rows: Rows<R>) -> DataResult<TrajectoryFile> {
+    collect(rows, |_| Ok(TrajectoryFormat::Euroc))?.stamped().map(|(file, _)| file)
+}
+
+fn collect<R: BufRead>(
+    mut rows: Rows<R>,
+    format: impl Fn(&Row<'_>) -> DataResult<TrajectoryFormat>,
+) -> DataResult<Collected> {
     let mut collected: Option<Collected> = None;
     let mut heading = false;
     while let Some(row) = rows.next_row()? {
         match &mut collected {
             Some(collected) => collected.push(&row)?,
             None if !heading && is_heading(&row) => heading = true,
-            None => collected.insert(Collected::for_row(&row)?).push(&row)?,
+            None => collected.insert(Collected::new(format(&row)?, row.len())).push(&row)?,
         }
     }
     match collected {
-        Some(collected) => collected.finish(),
+        Some(collected) => Ok(collected),
         None if heading => Err(DataError::new("the file holds a heading but no poses")),
         None => Err(DataError::new("the file is empty: it holds no poses")),
     }
