@@ -10,7 +10,7 @@ use vice_core::frames::{Body, BodyFromCamera, Sensor};
 use vice_core::imu::{ImuSample, InertialState};
 use vice_core::time::Stamp;
 use vice_core::trajectory::Trajectory;
-use vice_files::trajectory::{self, ReadOptions, TrajectoryFile};
+use vice_files::trajectory::{self, TrajectoryFile};
 
 use crate::camera::{EurocCamera, cached};
 use crate::depth::EurocDepth;
@@ -86,7 +86,7 @@ impl Sequence {
         let Some(folder) = &self.truth_folder else { return Ok(None) };
         cached(&self.truth, || {
             let path = folder.join("data.csv");
-            let file = trajectory::read(&path, &ReadOptions::default())?;
+            let file = trajectory::read_euroc(&path)?;
             // The file gives poses of its sensor, which need not be the body.
             let body_from_sensor = sensor::body_from_sensor(folder)?;
             let file = in_body(file, body_from_sensor);

@@ -257,6 +257,10 @@ fn stamps_in_another_unit_are_noticed() {
     sequence.write("mav0/cam0/data.csv", "0,a.png\n50000000,b.png\n");
     sequence.write("mav0/state_groundtruth_estimate0/data.csv", "0,0,0,0,1,0,0,0,0,0,0,0,0,0,0,0,0\n");
     assert_eq!(sequence.dataset().trajectory(GROUND_TRUTH).unwrap().len(), 1);
+    // Eight columns could be mistaken for a TUM file, whose quaternion is turned round.
+    sequence.write("mav0/state_groundtruth_estimate0/data.csv", "7,0,0,0,1,0,0,0\n");
+    let truth = sequence.dataset().trajectory(GROUND_TRUTH).unwrap();
+    assert_eq!((truth.start().as_nanos(), truth.poses()[0].rotation().w), (7, 1.0));
 }
 
 #[test]

@@ -109,6 +109,15 @@ pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> DataResult<Traject
     }
 }
 
+/// Reads a file that is known to have EuRoC's layout, such as the ground truth of a sequence.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_euroc(path: impl AsRef<Path>) -> DataResult<TrajectoryFile> {
+    let path = path.as_ref();
+    parse::read_euroc_rows(crate::rows::open(path)?).map_err(|e| e.at(path))
+}
+
 /// Reads a file of relative motions and chains them from the identity.
 ///
 /// # Errors

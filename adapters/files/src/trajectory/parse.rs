@@ -35,7 +35,10 @@ pub fn read_rows<R: BufRead>(rows: Rows<R>) -> DataResult<Parsed> {
 
 /// Reads rows in the ground-truth layout of EuRoC, whatever else they might be.
 pub(super) fn read_euroc_rows<R: BufRead>(rows: Rows<R>) -> DataResult<TrajectoryFile> {
-    collect(rows, |_| Ok(TrajectoryFormat::Euroc))?.stamped().map(|(file, _)| file)
+    match collect(rows, |_| Ok(TrajectoryFormat::Euroc))?.finish()? {
+        Parsed::Stamped(file) => Ok(file),
+        Parsed::Kitti(_) => Err(DataError::new("the rows have no stamps")),
+    }
 }
 
 fn collect<R: BufRead>(
@@ -90,17 +93,17 @@ enum Collected {
 }
 
 impl Collected {
-    fn for_row(row: &Row<'_>) -> DataResult<Self> {
-        Ok(match format_of(row)? {
+    fn new(format: TrajectoryFormat, columns: usize) -> Self {
+        match format {
             TrajectoryFormat::Kitti => Self::Kitti(Vec::new()),
             TrajectoryFormat::Euroc => Self::Euroc {
                 poses: Vec::new(),
                 inertial: Vec::new(),
-                columns: if row.len() >= EUROC_COLUMNS { EUROC_COLUMNS } else { 8 },
+                columns: if columns >= EUROC_COLUMNS { EUROC_COLUMNS } else { 8 },
                 lines: Vec::new(),
             },
             _ => Self::Tum { poses: Vec::new(), lines: Vec::new() },
-        })
+        }
     }
 
     fn push(&mut self, row: &Row<'_>) -> DataResult<()> {
