@@ -25,9 +25,9 @@ const FILE: &str = "vice-video.toml";
 
 /// Opens the format `video`.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct VideoFactory;
+pub struct Video;
 
-impl DatasetFactory for VideoFactory {
+impl DatasetFactory for Video {
     fn info(&self) -> FormatInfo {
         FormatInfo {
             name: "video".to_string(),
@@ -88,7 +88,9 @@ impl VideoDataset {
         if camera == known {
             Ok(())
         } else {
-            Err(DataError::new(format!("there is no camera `{camera}`")).at(&self.file).hint(format!("it has: {known}")))
+            Err(DataError::new(format!("there is no camera `{camera}`"))
+                .at(&self.file)
+                .hint(format!("it has: {known}")))
         }
     }
 }
@@ -96,8 +98,9 @@ impl VideoDataset {
 /// The path of a file that a description names, below the description's folder.
 fn beside(file: &Path, relative: &str) -> DataResult<PathBuf> {
     let folder = file.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    paths::safe_join(folder, relative)
-        .map_err(|e| DataError::new(e.problem().to_string()).at(file).hint("paths stay below the file's folder"))
+    paths::safe_join(folder, relative).map_err(|e| {
+        DataError::new(e.problem().to_string()).at(file).hint("paths stay below the file's folder")
+    })
 }
 
 impl Dataset for VideoDataset {

@@ -62,8 +62,9 @@ impl Ffmpeg {
             DataError::new(format!("decoding a film needs FFmpeg: {what}")).hint(INSTALL).because(e)
         })?;
         let text = String::from_utf8_lossy(&output.stdout);
-        let version = libavcodec_version(&text)
-            .ok_or_else(|| DataError::new(format!("`{name}` does not say which FFmpeg it is")).hint(INSTALL))?;
+        let version = libavcodec_version(&text).ok_or_else(|| {
+            DataError::new(format!("`{name}` does not say which FFmpeg it is")).hint(INSTALL)
+        })?;
         if version < OLDEST_LIBAVCODEC {
             let first = text.lines().next().unwrap_or_default();
             return Err(DataError::new(format!("FFmpeg is too old: {first}")).hint(INSTALL));

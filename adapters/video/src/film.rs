@@ -148,7 +148,9 @@ impl Film {
         let next = decoder.next - 1;
         let words = decoder.running.take_words().join("; ");
         state.decoder = Some(decoder);
-        Err(DataError::new(format!("frame {index} cannot be decoded: FFmpeg goes on at frame {next}; {words}")))
+        Err(DataError::new(format!(
+            "frame {index} cannot be decoded: FFmpeg goes on at frame {next}; {words}"
+        )))
     }
 
     /// Whether a decoder that stands before `next` gets to `index` sooner than one that is started for it.
@@ -171,7 +173,8 @@ impl Film {
     fn start(&self, state: &mut State, index: usize, from: usize) -> DataResult<Decoder> {
         let mut input: Vec<OsString> = vec!["-copyts".into()];
         if from > 0 {
-            let seconds = self.index.seconds(self.seek_target(from)) + 0.5 / f64::from(self.index.ticks_per_second);
+            let seconds =
+                self.index.seconds(self.seek_target(from)) + 0.5 / f64::from(self.index.ticks_per_second);
             let at = format!("{seconds:.6}");
             input.extend(["-seek_timestamp", "1", "-noaccurate_seek", "-ss", &at].map(OsString::from));
         }
@@ -250,7 +253,9 @@ impl Film {
         let text = String::from_utf8_lossy(&head).into_owned();
         let fields: Vec<&str> = text.split_whitespace().collect();
         let size = match fields[..] {
-            [kind, columns, rows, "255"] if kind == magic => columns.parse::<u32>().ok().zip(rows.parse().ok()),
+            [kind, columns, rows, "255"] if kind == magic => {
+                columns.parse::<u32>().ok().zip(rows.parse().ok())
+            }
             _ => None,
         };
         let Some((width, height)) = size else {

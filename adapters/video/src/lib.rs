@@ -46,7 +46,7 @@ mod mov;
 mod stamped;
 mod state;
 
-pub use dataset::VideoFactory;
+pub use dataset::Video;
 pub use description::{CameraPart, Description};
 pub use ffmpeg::Ffmpeg;
 pub use stamped::{StampedFilm, check_count, read_stamps};

@@ -18,7 +18,8 @@ use crate::film::{DecodeStats, Film};
 pub fn read_stamps(path: impl AsRef<Path>) -> DataResult<Arc<[Stamp]>> {
     let path = path.as_ref();
     let mut stamps: Vec<Stamp> = Vec::new();
-    let mut rows = rows::open(path).map_err(|e| e.hint("the stamps of the camera's frames are read from it"))?;
+    let mut rows =
+        rows::open(path).map_err(|e| e.hint("the stamps of the camera's frames are read from it"))?;
     let mut read = || {
         while let Some(row) = rows.next_row()? {
             if row.len() > 1 {
@@ -26,7 +27,9 @@ pub fn read_stamps(path: impl AsRef<Path>) -> DataResult<Arc<[Stamp]>> {
             }
             let stamp = row.nanos(0)?;
             if let Some(previous) = stamps.last().filter(|p| **p >= stamp) {
-                return Err(row.error(format!("stamp {stamp} ns is not later than the one before, {previous} ns")));
+                return Err(
+                    row.error(format!("stamp {stamp} ns is not later than the one before, {previous} ns"))
+                );
             }
             stamps.push(stamp);
         }
@@ -71,7 +74,13 @@ pub struct StampedFilm {
 
 impl StampedFilm {
     /// A film by its path, the path of its stamps, and columns and rows of the calibration.
-    pub fn new(film: PathBuf, stamps: PathBuf, size: (u32, u32), format: PixelFormat, ffmpeg: Ffmpeg) -> Self {
+    pub fn new(
+        film: PathBuf,
+        stamps: PathBuf,
+        size: (u32, u32),
+        format: PixelFormat,
+        ffmpeg: Ffmpeg,
+    ) -> Self {
         Self { film, stamps, size, format, ffmpeg, opened: OnceLock::new() }
     }
 
@@ -147,7 +156,9 @@ mod tests {
             check_count(Path::new("s.txt"), stamps, Path::new("f.mov"), frames).map_err(|e| e.to_string())
         };
         assert!(check(3, 3).is_ok());
-        assert!(check(4, 3).unwrap_err().contains("s.txt: more stamps than frames: 4 stamps, but f.mov has 3"));
+        assert!(
+            check(4, 3).unwrap_err().contains("s.txt: more stamps than frames: 4 stamps, but f.mov has 3")
+        );
         assert!(check(2, 3).unwrap_err().contains("fewer stamps than frames"));
     }
 }

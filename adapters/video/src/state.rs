@@ -45,7 +45,10 @@ mod tests {
         let poses = |n: i64| {
             Trajectory::from_poses((0..n).map(|i| {
                 let x = 0.02 * i as f64;
-                (Stamp::from_nanos(i * 10_000_000), Rigid::from_parts([x, 0.0, 0.0].into(), Default::default()))
+                (
+                    Stamp::from_nanos(i * 10_000_000),
+                    Rigid::from_parts([x, 0.0, 0.0].into(), Default::default()),
+                )
             }))
             .unwrap()
         };

@@ -18,7 +18,8 @@ fn folder(toml: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
     write(FILE, toml);
-    let stamps: Vec<String> = (0..10).map(|i| (1_700_000_000_000_000_000_i64 + i * 33_000_000).to_string()).collect();
+    let stamps: Vec<String> =
+        (0..10).map(|i| (1_700_000_000_000_000_000_i64 + i * 33_000_000).to_string()).collect();
     write("stamps.txt", &stamps.join("\n"));
     let poses: String = (0..50).map(|i| format!("{}.{:02} {} 0 1 0 0 0 1\n", 1_700_000_000, i, i)).collect();
     write("gt.tum", &poses);
@@ -28,17 +29,17 @@ fn folder(toml: &str) -> tempfile::TempDir {
 }
 
 fn open(folder: &tempfile::TempDir) -> DataResult<Box<dyn Dataset>> {
-    VideoFactory.open(folder.path(), &OpenOptions::default())
+    Video.open(folder.path(), &OpenOptions::default())
 }
 
 #[test]
 fn a_folder_or_its_file_is_recognised() {
     let folder = folder(TOML);
-    assert_eq!(VideoFactory.probe(folder.path()), Probe::Yes);
-    assert_eq!(VideoFactory.probe(&folder.path().join(FILE)), Probe::Yes);
-    assert_eq!(VideoFactory.probe(&folder.path().join("stamps.txt")), Probe::No);
-    assert_eq!(VideoFactory.probe(Path::new("/no/such")), Probe::No);
-    let by_file = VideoFactory.open(&folder.path().join(FILE), &OpenOptions::default()).unwrap();
+    assert_eq!(Video.probe(folder.path()), Probe::Yes);
+    assert_eq!(Video.probe(&folder.path().join(FILE)), Probe::Yes);
+    assert_eq!(Video.probe(&folder.path().join("stamps.txt")), Probe::No);
+    assert_eq!(Video.probe(Path::new("/no/such")), Probe::No);
+    let by_file = Video.open(&folder.path().join(FILE), &OpenOptions::default()).unwrap();
     assert_eq!(by_file.streams(), ["ground-truth", "a-first", "slam"]);
     assert_eq!(by_file.cameras(), ["camera"]);
     assert_eq!(by_file.name(), folder.path().file_name().unwrap().to_str().unwrap());

@@ -76,10 +76,7 @@ fn frames_are_told_in_the_order_in_which_they_are_shown() {
     let index = read_bytes(&film(&Parts::default())).unwrap();
     assert_eq!((index.size, index.ticks_per_second), ((64, 48), 100));
     assert_eq!(index.shown, [10, 20, 30, 40]);
-    assert_eq!(
-        index.sync,
-        [SyncFrame { shown: 10, decoded: 0 }, SyncFrame { shown: 40, decoded: 30 }]
-    );
+    assert_eq!(index.sync, [SyncFrame { shown: 10, decoded: 0 }, SyncFrame { shown: 40, decoded: 30 }]);
     let all = read_bytes(&film(&Parts { stss: None, ..Parts::default() })).unwrap();
     assert_eq!(all.sync.len(), 4, "without a list of them every frame starts decoding");
     let turned = read_bytes(&film(&Parts { turned: true, ..Parts::default() })).unwrap();
