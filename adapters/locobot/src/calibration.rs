@@ -1,0 +1,81 @@
+//! From `sensor_msgs/CameraInfo` to a camera of the core.
+
+use vice_core::camera::{Camera, Model};
+use vice_core::error::{DataError, DataResult};
+
+use crate::message::CameraInfo;
+
+/// The camera of a topic. Binning and region of interest are applied as ROS's `image_geometry` does.
+///
+/// # Errors
+/// [`DataError`] if the camera was not calibrated or its model is unknown.
+pub(crate) fn camera(info: &CameraInfo, rectified: bool) -> DataResult<Camera> {
+    let [k0, _, k2, _, k4, k5, ..] = info.k;
+    let [p0, _, p2, _, _, p5, p6, ..] = info.p;
+    let [mut fx, mut fy, mut cx, mut cy] = if rectified { [p0, p5, p2, p6] } else { [k0, k4, k2, k5] };
+    if fx == 0.0 && fy == 0.0 {
+        return Err(DataError::new("the camera is not calibrated: its focal length is 0")
+            .hint("give a calibration file"));
+    }
+    let [x, y, height, width] = info.roi;
+    let (mut size_x, mut size_y) = (info.width, info.height);
+    if width > 0 && height > 0 {
+        (size_x, size_y) = (width, height);
+        cx -= f64::from(x);
+        cy -= f64::from(y);
+    }
+    let [by_x, by_y] = info.binning.map(|b| b.max(1));
+    (size_x, size_y) = (size_x / by_x, size_y / by_y);
+    (fx, cx) = (fx / f64::from(by_x), cx / f64::from(by_x));
+    (fy, cy) = (fy / f64::from(by_y), cy / f64::from(by_y));
+    let coefficients: &[f64] = if rectified { &[] } else { &info.distortion };
+    let name = if rectified || coefficients.is_empty() { "pinhole" } else { &info.model };
+    let model = Model::from_name(name, coefficients).map_err(|e| DataError::new(e.to_string()))?;
+    Camera::new(size_x, size_y, [fx, fy, cx, cy], model).map_err(|e| DataError::new(e.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn info() -> CameraInfo {
+        let mut p = [0.0; 12];
+        (p[0], p[2], p[5], p[6]) = (300.0, 310.0, 301.0, 230.0);
+        CameraInfo {
+            frame: "c".to_string(),
+            height: 480,
+            width: 640,
+            model: "plumb_bob".to_string(),
+            distortion: vec![0.1, 0.0, 0.0, 0.0, 0.0],
+            k: [400.0, 0.0, 320.0, 0.0, 402.0, 240.0, 0.0, 0.0, 1.0],
+            p,
+            binning: [0, 0],
+            roi: [0; 4],
+        }
+    }
+
+    #[test]
+    fn rectified_binned_and_cut_images() {
+        let raw = camera(&info(), false).unwrap();
+        assert_eq!((raw.fx_fy_cx_cy(), raw.model().name()), ([400.0, 402.0, 320.0, 240.0], "radtan"));
+        let rectified = camera(&info(), true).unwrap();
+        assert_eq!(
+            (rectified.fx_fy_cx_cy(), rectified.model().name()),
+            ([300.0, 301.0, 310.0, 230.0], "pinhole")
+        );
+        let binned = camera(&CameraInfo { binning: [2, 2], ..info() }, false).unwrap();
+        assert_eq!((binned.width(), binned.fx_fy_cx_cy()), (320, [200.0, 201.0, 160.0, 120.0]));
+        let cut = camera(&CameraInfo { roi: [20, 40, 100, 200], ..info() }, false).unwrap();
+        assert_eq!((cut.width(), cut.height(), cut.fx_fy_cx_cy()), (200, 100, [400.0, 402.0, 300.0, 200.0]));
+        let plain = CameraInfo { distortion: vec![], model: String::new(), ..info() };
+        assert_eq!(camera(&plain, false).unwrap().model().name(), "pinhole");
+    }
+
+    #[test]
+    fn what_is_no_calibration_is_refused() {
+        let error = |info: CameraInfo| camera(&info, false).unwrap_err().to_string();
+        assert!(error(CameraInfo { k: [0.0; 9], ..info() }).contains("not calibrated"));
+        assert!(error(CameraInfo { model: "mystery".to_string(), ..info() }).contains("mystery"));
+        assert!(error(CameraInfo { width: 0, ..info() }).contains("empty"));
+    }
+}

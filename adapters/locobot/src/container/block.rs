@@ -1,0 +1,349 @@
+//! Blocks: the chunks of a bag or an MCAP file, decompressed within bounds and kept while they are being used.
+
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::Path;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use rayon::prelude::*;
+use vice_core::error::{DataError, DataResult};
+
+use super::{Locator, Payload, Scan, Visitor};
+
+/// Bytes beyond which a block is refused: recorders write blocks of about a megabyte, or of one message.
+const MAX_BLOCK_BYTES: u64 = 1 << 30;
+/// Bytes reserved on the word of a header, before any data is seen.
+const TRUSTED_BYTES: u64 = 64 << 20;
+/// Blocks kept: a step forward needs those of the colour and the depth image, and their successors.
+const CACHED_BLOCKS: usize = 4;
+/// Bytes kept, beside the newest block.
+const CACHED_BYTES: usize = 64 << 20;
+/// Bytes read at once where records are small.
+const WINDOW_BYTES: usize = 64 << 10;
+
+/// How a block is compressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Compression {
+    None,
+    Bz2,
+    Lz4,
+    Zstd,
+}
+
+impl Compression {
+    /// By the name in a header.
+    pub(super) fn from_name(name: &str) -> DataResult<Self> {
+        match name {
+            "" | "none" => Ok(Self::None),
+            "bz2" => Ok(Self::Bz2),
+            "lz4" => Ok(Self::Lz4),
+            "zstd" => Ok(Self::Zstd),
+            other => {
+                Err(DataError::new(format!("unknown compression `{other}`"))
+                    .hint("known: none, bz2, lz4, zstd"))
+            }
+        }
+    }
+}
+
+/// A run of records in a file.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Block {
+    /// Offset in the file.
+    pub(super) offset: u64,
+    /// Bytes in the file.
+    pub(super) stored: u64,
+    /// Bytes after decompression, as the header says.
+    pub(super) size: u64,
+    pub(super) compression: Compression,
+    /// Check sum of the decompressed bytes.
+    pub(super) crc: Option<u32>,
+    /// The file ends before the block does.
+    pub(super) cut: bool,
+}
+
+/// Decompresses; gives what came out and, where that is not everything, why.
+pub(super) fn decompress(
+    compression: Compression,
+    stored: Vec<u8>,
+    size: u64,
+    salvage: bool,
+) -> (Vec<u8>, Option<String>) {
+    if size > MAX_BLOCK_BYTES {
+        return (Vec::new(), Some(format!("claims {size} bytes, more than {MAX_BLOCK_BYTES} is not read")));
+    }
+    let capacity = size.min(TRUSTED_BYTES) as usize;
+    let mut out = Vec::new();
+    let done = match compression {
+        Compression::None => {
+            out = stored;
+            Ok(0)
+        }
+        Compression::Zstd if !salvage && size <= TRUSTED_BYTES => {
+            out.reserve_exact(capacity);
+            zstd::bulk::Decompressor::new().and_then(|mut d| d.decompress_to_buffer(&stored, &mut out))
+        }
+        Compression::Zstd => {
+            out.reserve_exact(capacity);
+            zstd::stream::read::Decoder::new(stored.as_slice())
+                .and_then(|d| d.take(size + 1).read_to_end(&mut out))
+        }
+        Compression::Lz4 => {
+            out.reserve_exact(capacity);
+            lz4::Decoder::new(stored.as_slice()).and_then(|d| d.take(size + 1).read_to_end(&mut out))
+        }
+        Compression::Bz2 => {
+            out.reserve_exact(capacity);
+            bzip2::read::BzDecoder::new(stored.as_slice()).take(size + 1).read_to_end(&mut out)
+        }
+    };
+    let problem = match done {
+        Err(e) => Some(format!("cannot be decompressed: {e}")),
+        Ok(_) if out.len() as u64 != size => Some(format!("has {} bytes, its header says {size}", out.len())),
+        Ok(_) => None,
+    };
+    (out, problem)
+}
+
+/// Random access to bytes of a file or of memory.
+pub(super) trait Source {
+    /// Bytes there are.
+    fn len(&self) -> u64;
+    /// `len` bytes from `at`; `None` where the source ends before that.
+    fn get(&mut self, at: u64, len: usize) -> DataResult<Option<&[u8]>>;
+}
+
+/// A decompressed block.
+pub(super) struct Memory<'a>(pub(super) &'a [u8]);
+
+impl Source for Memory<'_> {
+    fn len(&self) -> u64 {
+        self.0.len() as u64
+    }
+
+    fn get(&mut self, at: u64, len: usize) -> DataResult<Option<&[u8]>> {
+        let Ok(at) = usize::try_from(at) else { return Ok(None) };
+        Ok(at.checked_add(len).and_then(|end| self.0.get(at..end)))
+    }
+}
+
+/// A part of a file, through a window: what lies between the places asked for is not read.
+pub(super) struct Window<'a> {
+    file: &'a BlockFile,
+    offset: u64,
+    len: u64,
+    window: Vec<u8>,
+    window_at: u64,
+}
+
+impl Source for Window<'_> {
+    fn len(&self) -> u64 {
+        self.len
+    }
+
+    fn get(&mut self, at: u64, len: usize) -> DataResult<Option<&[u8]>> {
+        let Some(end) = at.checked_add(len as u64).filter(|end| *end <= self.len) else { return Ok(None) };
+        if at < self.window_at || end > self.window_at + self.window.len() as u64 {
+            let bytes = (self.len - at).min(len.max(WINDOW_BYTES) as u64) as usize;
+            self.window.resize(bytes, 0);
+            self.window_at = at;
+            self.file.read_at(self.offset + at, &mut self.window)?;
+        }
+        let from = (at - self.window_at) as usize;
+        Ok(Some(&self.window[from..from + len]))
+    }
+}
+
+/// Takes the records of a block apart; one for each of the formats that have blocks.
+pub(super) trait Records: Send + Sync {
+    /// Visits the messages of a block.
+    ///
+    /// # Errors
+    /// [`DataError`] where a record is not as it should be; what came before it has been visited.
+    fn walk(
+        &self,
+        source: &mut dyn Source,
+        place: (u32, u32),
+        state: &mut State,
+        scan: &mut Scan,
+        visitor: &mut dyn Visitor,
+    ) -> DataResult<()>;
+}
+
+/// What records of a file say of later ones: connections of a bag, schemas and channels of an MCAP file.
+#[derive(Default)]
+pub(super) struct State {
+    /// Topic of a connection or channel.
+    pub(super) topics: std::collections::HashMap<u32, usize>,
+    /// Name of a schema.
+    pub(super) schemas: std::collections::HashMap<u16, String>,
+}
+
+type Decompressed = Result<Arc<Vec<u8>>, String>;
+
+/// A file of blocks.
+pub(super) struct BlockFile {
+    file: Mutex<File>,
+    len: u64,
+    cache: Mutex<Vec<(u32, Arc<OnceLock<Decompressed>>)>>,
+}
+
+impl BlockFile {
+    pub(super) fn open(path: &Path) -> DataResult<Self> {
+        let failed = |e: std::io::Error| DataError::new("cannot be read").at(path).because(e);
+        let file = File::open(path).map_err(failed)?;
+        let len = file.metadata().map_err(failed)?.len();
+        Ok(Self { file: Mutex::new(file), len, cache: Mutex::default() })
+    }
+
+    pub(super) fn len(&self) -> u64 {
+        self.len
+    }
+
+    /// All of the file, through a window.
+    pub(super) fn window(&self) -> Window<'_> {
+        self.window_of(0, self.len)
+    }
+
+    fn window_of(&self, offset: u64, len: u64) -> Window<'_> {
+        Window { file: self, offset, len, window: Vec::new(), window_at: 0 }
+    }
+
+    fn read_at(&self, offset: u64, bytes: &mut [u8]) -> DataResult<()> {
+        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        file.seek(SeekFrom::Start(offset))
+            .and_then(|_| file.read_exact(bytes))
+            .map_err(|e| DataError::new("cannot be read").byte(offset).because(e))
+    }
+
+    fn read_vec(&self, offset: u64, len: u64) -> DataResult<Vec<u8>> {
+        // Where a block lies inside the file was checked when it was found, so that this is no empty claim.
+        let mut bytes = Vec::with_capacity(len as usize);
+        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        file.seek(SeekFrom::Start(offset))
+            .and_then(|_| (&mut *file).take(len).read_to_end(&mut bytes))
+            .map_err(|e| DataError::new("cannot be read").byte(offset).because(e))?;
+        Ok(bytes)
+    }
+
+    fn load(&self, block: &Block) -> (Vec<u8>, Option<String>) {
+        if block.stored > MAX_BLOCK_BYTES {
+            return (Vec::new(), Some(format!("has {} bytes, too many to be read", block.stored)));
+        }
+        let stored = match self.read_vec(block.offset, block.stored) {
+            Ok(stored) => stored,
+            Err(e) => return (Vec::new(), Some(e.to_string())),
+        };
+        let (bytes, problem) = decompress(block.compression, stored, block.size, block.cut);
+        if problem.is_none()
+            && let Some(crc) = block.crc
+        {
+            let found = crc32fast::hash(&bytes);
+            if found != crc {
+                let problem = format!("has the check sum {found:08x}, its header says {crc:08x}");
+                return (Vec::new(), Some(problem));
+            }
+        }
+        (bytes, problem)
+    }
+
+    fn cached(&self, index: u32, block: &Block) -> DataResult<Arc<Vec<u8>>> {
+        let entry = {
+            let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+            match cache.iter().position(|(i, _)| *i == index) {
+                Some(at) => {
+                    let hit = cache.remove(at);
+                    cache.push(hit);
+                }
+                None => {
+                    let size = |entry: &Arc<OnceLock<Decompressed>>| match entry.get() {
+                        Some(Ok(bytes)) => bytes.len(),
+                        _ => 0,
+                    };
+                    while cache.len() >= CACHED_BLOCKS
+                        || cache.iter().map(|(_, entry)| size(entry)).sum::<usize>() > CACHED_BYTES
+                    {
+                        cache.remove(0);
+                    }
+                    cache.push((index, Arc::default()));
+                }
+            }
+            cache.last().map(|(_, entry)| Arc::clone(entry)).unwrap_or_default()
+        };
+        // Decompressed outside the lock of the cache, and once where several threads want the same block.
+        let bytes = entry.get_or_init(|| {
+            let (bytes, problem) = self.load(block);
+            match problem {
+                Some(problem) if !block.cut => Err(problem),
+                _ => Ok(Arc::new(bytes)),
+            }
+        });
+        bytes.clone().map_err(|problem| DataError::new(format!("the chunk {problem}")).byte(block.offset))
+    }
+
+    /// Reads a message.
+    pub(super) fn read(&self, blocks: &[Block], at: &Locator) -> DataResult<Payload> {
+        let block = &blocks[at.block as usize];
+        if block.compression == Compression::None && block.crc.is_none() {
+            return Ok(Payload::Alone(self.read_vec(block.offset + at.at, u64::from(at.bytes))?));
+        }
+        let bytes = self.cached(at.block, block)?;
+        let (from, to) = (at.at as usize, at.at as usize + at.bytes as usize);
+        if to > bytes.len() {
+            return Err(DataError::new("the file has changed since it was opened").byte(block.offset));
+        }
+        Ok(Payload::Part { block: bytes, from, to })
+    }
+
+    /// Walks all blocks in order; several are decompressed at once.
+    pub(super) fn scan(
+        &self,
+        blocks: &[Block],
+        records: &dyn Records,
+        file: u32,
+        path: &Path,
+        scan: &mut Scan,
+        visitor: &mut dyn Visitor,
+    ) {
+        let mut state = State::default();
+        let mut at = 0;
+        while at < blocks.len() {
+            if blocks[at].compression == Compression::None {
+                let block = &blocks[at];
+                let mut source = self.window_of(block.offset, block.stored);
+                let walked = records.walk(&mut source, (file, at as u32), &mut state, scan, visitor);
+                if let Err(e) = walked {
+                    scan.damaged(&inside(e, block, path));
+                }
+                at += 1;
+                continue;
+            }
+            let batch = blocks[at..].iter().take_while(|b| b.compression != Compression::None);
+            let batch: Vec<&Block> = batch.take(rayon::current_num_threads().min(16)).collect();
+            let loaded: Vec<_> = batch.par_iter().map(|block| self.load(block)).collect();
+            for (block, (bytes, problem)) in batch.into_iter().zip(loaded) {
+                if let Some(problem) = &problem {
+                    let kept = if block.cut { "read as far as it goes" } else { "its messages are left out" };
+                    let problem = format!("the chunk {problem}: {kept}");
+                    scan.damaged(&DataError::new(problem).at(path).byte(block.offset));
+                }
+                if problem.is_none() || block.cut {
+                    let place = (file, at as u32);
+                    let walked = records.walk(&mut Memory(&bytes), place, &mut state, scan, visitor);
+                    if let Err(e) = walked
+                        && !block.cut
+                    {
+                        scan.damaged(&inside(e, block, path));
+                    }
+                }
+                at += 1;
+            }
+        }
+    }
+}
+
+/// The error of a record in a block, with the byte of the file that the block starts at.
+fn inside(error: DataError, block: &Block, path: &Path) -> DataError {
+    let problem = format!("the chunk is damaged: {error}: the rest of it is left out");
+    DataError::new(problem).at(path).byte(block.offset)
+}

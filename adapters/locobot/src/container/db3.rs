@@ -1,0 +1,163 @@
+//! rosbag2 sqlite3 data bases: a table of topics and a table of messages.
+//!
+//! Opened read-only and as immutable, so that sqlite neither locks nor writes anything beside the recording.
+
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use rusqlite::{Connection, OpenFlags};
+use vice_core::error::{DataError, DataResult};
+use vice_core::time::Stamp;
+
+use super::{
+    Container, Encoding, HEAD_BYTES, Locator, MAX_MESSAGE_BYTES, Message, Payload, Scan, Visitor, Want,
+};
+
+/// What a data base starts with.
+pub(super) const MAGIC: &[u8] = b"SQLite format 3\0";
+
+/// A data base.
+pub(super) struct Db3 {
+    path: PathBuf,
+    connection: Mutex<Connection>,
+    /// Each message is compressed with zstd.
+    compressed: bool,
+}
+
+/// Whether a data base has the tables of rosbag2.
+pub(super) fn is_rosbag2(path: &Path) -> bool {
+    let tables = "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('topics', 'messages')";
+    connect(path).and_then(|c| c.query_row(tables, [], |r| r.get::<_, i64>(0))).is_ok_and(|n| n == 2)
+}
+
+fn connect(path: &Path) -> rusqlite::Result<Connection> {
+    // Of the path in an URI only what would end or escape it matters.
+    let text = path.to_string_lossy().replace('%', "%25").replace('?', "%3f").replace('#', "%23");
+    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY
+        | OpenFlags::SQLITE_OPEN_URI
+        | OpenFlags::SQLITE_OPEN_NO_MUTEX
+        | OpenFlags::SQLITE_OPEN_EXRESCODE;
+    Connection::open_with_flags(format!("file:{text}?immutable=1"), flags)
+}
+
+fn failed(what: impl Into<String>) -> impl FnOnce(rusqlite::Error) -> DataError {
+    let what = what.into();
+    move |e| DataError::new(format!("{what}: {e}"))
+}
+
+impl Db3 {
+    pub(super) fn open(path: &Path, compressed: bool) -> DataResult<Self> {
+        let connection = connect(path).map_err(|e| failed("the data base cannot be opened")(e).at(path))?;
+        Ok(Self { path: path.to_path_buf(), connection: Mutex::new(connection), compressed })
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Connection> {
+        self.connection.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The topics by their number in the data base, with the number in `scan`.
+    fn topics(&self, scan: &mut Scan, visitor: &mut dyn Visitor) -> rusqlite::Result<BTreeMap<i64, usize>> {
+        let connection = self.lock();
+        let mut query =
+            connection.prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id")?;
+        let mut rows = query.query([])?;
+        let mut topics = BTreeMap::new();
+        while let Some(row) = rows.next()? {
+            let (name, kind, format): (String, String, String) = (row.get(1)?, row.get(2)?, row.get(3)?);
+            topics.insert(row.get(0)?, scan.topic(&name, &kind, Encoding::from_name(&format), visitor));
+        }
+        Ok(topics)
+    }
+
+    /// `HEAD_BYTES` or all of a message of a row.
+    fn message(&self, connection: &Connection, row: i64, head: bool) -> DataResult<Vec<u8>> {
+        let name = || format!("message {row} cannot be read");
+        let mut blob = connection.blob_open("main", "messages", "data", row, true).map_err(failed(name()))?;
+        let size = blob.len() as u64;
+        let file_len = std::fs::metadata(&self.path).map_or(0, |m| m.len());
+        if size > MAX_MESSAGE_BYTES.min(file_len) {
+            return Err(DataError::new(format!("message {row} claims {size} bytes")));
+        }
+        let read = |e: std::io::Error| DataError::new(format!("message {row} cannot be read: {e}"));
+        let mut bytes = Vec::new();
+        if !self.compressed {
+            let wanted = if head { size.min(HEAD_BYTES as u64) } else { size } as usize;
+            bytes.resize(wanted, 0);
+            blob.read_exact(&mut bytes).map_err(read)?;
+            return Ok(bytes);
+        }
+        let limit = if head { HEAD_BYTES as u64 } else { MAX_MESSAGE_BYTES };
+        let decoder = zstd::stream::read::Decoder::new(blob).map_err(read)?;
+        decoder.take(limit).read_to_end(&mut bytes).map_err(read)?;
+        Ok(bytes)
+    }
+
+    /// Visits the rows after `last` in order; `last` follows. An error is damage at the row after it.
+    fn walk(
+        &self,
+        file: u32,
+        topics: &BTreeMap<i64, usize>,
+        last: &mut i64,
+        scan: &mut Scan,
+        visitor: &mut dyn Visitor,
+    ) -> DataResult<()> {
+        let connection = self.lock();
+        let wrong = || failed("the table of messages is damaged");
+        let mut query = connection
+            .prepare("SELECT id, topic_id, timestamp FROM messages WHERE id > ?1 ORDER BY id")
+            .map_err(wrong())?;
+        let mut rows = query.query([*last]).map_err(wrong())?;
+        while let Some(row) = rows.next().map_err(wrong())? {
+            let id: i64 = row.get(0).map_err(wrong())?;
+            let (topic, nanos): (i64, i64) = (row.get(1).map_err(wrong())?, row.get(2).map_err(wrong())?);
+            *last = id;
+            let Some(&topic) = topics.get(&topic) else {
+                return Err(DataError::new(format!("a message of unknown topic {topic}")));
+            };
+            let recorded = Stamp::from_nanos(nanos);
+            scan.topics[topic].note(recorded, 1);
+            let want = scan.wants[topic];
+            if want == Want::Nothing {
+                continue;
+            }
+            let bytes = self.message(&connection, id, want == Want::Head)?;
+            let locator = Locator { file, block: 0, at: id as u64, bytes: 0 };
+            let encoding = scan.topics[topic].encoding;
+            visitor.message(&Message { topic, encoding, recorded, bytes: &bytes, locator });
+        }
+        Ok(())
+    }
+}
+
+impl Container for Db3 {
+    fn scan(&self, file: u32, scan: &mut Scan, visitor: &mut dyn Visitor) -> DataResult<()> {
+        let log = PathBuf::from(format!("{}-wal", self.path.display()));
+        if log.metadata().is_ok_and(|m| m.len() > 0) {
+            let problem = "messages that sqlite had not merged into the data base are not read";
+            scan.damaged(
+                &DataError::new(problem).at(&log).hint("open a copy once with sqlite3 to merge them"),
+            );
+        }
+        let topics = self.topics(scan, visitor).map_err(|e| {
+            failed("is no data base of rosbag2")(e).hint("it needs the tables topics and messages")
+        })?;
+        let mut last = i64::MIN;
+        if let Err(e) = self.walk(file, &topics, &mut last, scan, visitor) {
+            let after =
+                if last == i64::MIN { "nothing".to_string() } else { format!("up to message {last}") };
+            scan.damaged(&DataError::new(format!("{}: read {after}", e.problem())).at(&self.path));
+        }
+        Ok(())
+    }
+
+    fn read(&self, locator: &Locator) -> DataResult<Payload> {
+        let connection = self.lock();
+        Ok(Payload::Alone(self.message(&connection, locator.at as i64, false)?))
+    }
+
+    fn byte(&self, _: &Locator) -> Option<u64> {
+        None
+    }
+}

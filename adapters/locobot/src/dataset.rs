@@ -1,0 +1,285 @@
+//! A recording as a [`Dataset`].
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::{Arc, OnceLock};
+
+use nalgebra::Vector3;
+use vice_core::camera::Camera;
+use vice_core::dataset::{Dataset, DepthImage, Fact, Floor, GROUND_TRUTH, Image, Plane};
+use vice_core::error::{DataError, DataResult};
+use vice_core::frames::{BodyFromCamera, Sensor};
+use vice_core::imu::{ImuSample, InertialState, fit_velocity};
+use vice_core::time::{Span, Stamp};
+use vice_core::trajectory::Trajectory;
+
+use crate::choose::{Frames, Topics, is_rectified};
+use crate::container::{Locator, Recording, Topic};
+use crate::index::{InfoTopic, PoseTopic};
+use crate::pixels::{self, Packing};
+use crate::settings::Settings;
+use crate::streams::{self, GroundTruth, ODOM, SLAM};
+use crate::tf::{TfTree, Transform, list};
+use crate::wire::Reader;
+use crate::{calibration, facts, imu};
+
+/// The images of a topic that is in use.
+#[derive(Debug)]
+pub(crate) struct Images {
+    pub(crate) topic: String,
+    pub(crate) packing: Packing,
+    pub(crate) frame: String,
+    pub(crate) encoding: String,
+    pub(crate) stamps: Arc<[Stamp]>,
+    pub(crate) locators: Vec<Locator>,
+}
+
+/// An opened recording.
+pub(crate) struct RosDataset {
+    pub(crate) name: String,
+    pub(crate) path: PathBuf,
+    pub(crate) settings: Settings,
+    pub(crate) recording: Recording,
+    pub(crate) topics: Vec<Topic>,
+    pub(crate) chosen: Topics,
+    pub(crate) frames: Frames,
+    pub(crate) tf: TfTree,
+    pub(crate) camera: String,
+    pub(crate) color: Option<Images>,
+    pub(crate) depth: Option<Images>,
+    pub(crate) depth_offset: Span,
+    pub(crate) info: Option<InfoTopic>,
+    pub(crate) poses: BTreeMap<String, PoseTopic>,
+    pub(crate) ground_truth: Option<GroundTruth>,
+    pub(crate) fixed_camera: Option<Transform>,
+    pub(crate) damage: Vec<String>,
+    pub(crate) imu: OnceLock<Result<Arc<[ImuSample]>, String>>,
+}
+
+impl RosDataset {
+    fn color(&self, camera: &str) -> DataResult<&Images> {
+        match &self.color {
+            Some(color) if camera == self.camera => Ok(color),
+            Some(_) => {
+                Err(DataError::new(format!("no camera `{camera}`"))
+                    .hint(format!("there is: {}", self.camera)))
+            }
+            None => Err(self.no_camera()),
+        }
+    }
+
+    fn no_camera(&self) -> DataError {
+        let problem = self.chosen.color_problem.clone();
+        DataError::new(problem.unwrap_or_else(|| "no topic has colour or gray images".to_string()))
+            .at(&self.path)
+            .hint("set color_topic")
+    }
+
+    /// Reads and decodes a message of an image topic.
+    fn decode<T>(
+        &self,
+        images: &Images,
+        index: usize,
+        decode: impl Fn(Reader<'_>, Packing) -> DataResult<T>,
+    ) -> DataResult<T> {
+        let Some(locator) = images.locators.get(index) else {
+            let n = images.locators.len();
+            return Err(DataError::new(format!("topic {}: no frame {index}, there are {n}", images.topic)));
+        };
+        let payload = self.recording.read(locator)?;
+        let encoding = self.topics.iter().find(|t| t.name == images.topic).map(|t| t.encoding);
+        let encoding = encoding.unwrap_or(crate::container::Encoding::Other);
+        let reader = Reader::new(payload.bytes(), encoding).map_err(|e| DataError::new(e.to_string()));
+        reader.and_then(|r| decode(r, images.packing)).map_err(|e| {
+            let problem = format!("topic {}, frame {index}: {}", images.topic, with_causes(&e));
+            self.recording.place(locator, DataError::new(problem))
+        })
+    }
+
+    /// `body_from_frame` of a frame of tf.
+    fn base(&self) -> DataResult<&str> {
+        self.frames.base.as_deref().ok_or_else(|| {
+            DataError::new("the frame of the body is not known: tf has neither base_footprint nor base_link")
+                .at(&self.path)
+                .hint(format!("set base_frame; frames of tf: {}", list(&self.tf.frames())))
+        })
+    }
+
+    /// The trajectory to which inertial samples are tied.
+    fn reference(&self) -> Option<Trajectory> {
+        self.streams().iter().find_map(|s| self.trajectory(s).ok())
+    }
+}
+
+/// An error and its causes in one line.
+fn with_causes(error: &DataError) -> String {
+    let mut text = error.to_string();
+    let mut cause = std::error::Error::source(error);
+    while let Some(e) = cause {
+        text = format!("{text}: {e}");
+        cause = e.source();
+    }
+    text
+}
+
+impl Dataset for RosDataset {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn format(&self) -> &str {
+        crate::FORMAT
+    }
+
+    fn cameras(&self) -> Vec<String> {
+        self.color.iter().map(|_| self.camera.clone()).collect()
+    }
+
+    fn camera(&self, camera: &str) -> DataResult<Camera> {
+        let color = self.color(camera)?;
+        let Some(info) = &self.info else {
+            let infos = self.topics.iter().filter(|t| t.kind == "sensor_msgs/CameraInfo" && t.count > 0);
+            let infos: Vec<&str> = infos.map(|t| t.name.as_str()).collect();
+            return Err(DataError::new(format!(
+                "topic {} has no camera_info that belongs to it",
+                color.topic
+            ))
+            .at(&self.path)
+            .hint(format!(
+                "set camera_info_topic, or give a calibration file; there are: {}",
+                list(&infos)
+            )));
+        };
+        calibration::camera(&info.info, is_rectified(&color.topic)).map_err(|e| {
+            let topic = self.chosen.info.map_or("camera_info", |t| self.topics[t].name.as_str());
+            DataError::new(format!("topic {topic}: {}", with_causes(&e))).at(&self.path)
+        })
+    }
+
+    fn frames(&self, camera: &str) -> DataResult<Arc<[Stamp]>> {
+        self.color(camera).map(|c| Arc::clone(&c.stamps))
+    }
+
+    fn image(&self, camera: &str, index: usize) -> DataResult<Image> {
+        let color = self.color(camera)?;
+        self.decode(color, index, pixels::image)
+    }
+
+    fn body_from_camera(&self, camera: &str, stamp: Stamp) -> DataResult<BodyFromCamera> {
+        self.color(camera)?;
+        if let Some(fixed) = &self.fixed_camera {
+            return Ok(fixed.reinterpret());
+        }
+        let camera_frame = self.frames.camera.as_deref().ok_or_else(|| {
+            DataError::new("the images do not name their frame").at(&self.path).hint("set camera_frame")
+        })?;
+        let base = self.base()?;
+        if base == camera_frame {
+            return Ok(BodyFromCamera::identity());
+        }
+        let chain = self.tf.chain(base, camera_frame).map_err(|e| {
+            let problem = format!("the camera has no place in the body: {}", with_causes(&e));
+            DataError::new(problem)
+                .at(&self.path)
+                .hint("set base_frame and camera_frame, urdf or body_from_camera")
+        })?;
+        chain.at(stamp).map(|t| t.reinterpret()).map_err(|e| e.at(&self.path))
+    }
+
+    fn streams(&self) -> Vec<String> {
+        let topics = self.poses.keys().map(String::as_str);
+        streams::names(&self.tf, &self.frames, topics, self.ground_truth.as_ref())
+    }
+
+    fn trajectory(&self, stream: &str) -> DataResult<Trajectory> {
+        let base = self.frames.base.as_deref();
+        let of_topic = |name: &str, child: Option<&str>| {
+            let topic = self.poses.get(name)?;
+            let child = child.unwrap_or(&topic.child);
+            Some(streams::topic_trajectory(topic, name, child, &self.tf, base))
+        };
+        let trajectory = match (stream, &self.ground_truth) {
+            (GROUND_TRUTH, Some(GroundTruth::File(trajectory))) => Some(Ok(trajectory.clone())),
+            (GROUND_TRUTH, Some(GroundTruth::Topic(name))) => {
+                of_topic(name, self.settings.get("ground_truth_frame"))
+            }
+            (ODOM | SLAM, _) => {
+                let stamps = self.color.as_ref().map_or(&[][..], |c| &c.stamps);
+                let chain = streams::tf_chain(&self.tf, &self.frames, stream);
+                Some(chain.and_then(|chain| streams::tf_trajectory(&chain, stamps, stream)))
+            }
+            (name, _) => of_topic(name, None),
+        };
+        let trajectory = trajectory.unwrap_or_else(|| {
+            Err(DataError::new(format!("no stream `{stream}`"))
+                .hint(format!("there are: {}", list(&self.streams()))))
+        });
+        trajectory.map_err(|e| e.at(&self.path))
+    }
+
+    fn imu(&self) -> DataResult<Arc<[ImuSample]>> {
+        let Some(topic) = self.chosen.imu else {
+            let problem = self.chosen.imu_problem.as_ref();
+            return problem.map_or(Ok(Arc::new([])), |p| Err(DataError::new(p.clone()).at(&self.path)));
+        };
+        let name = &self.topics[topic].name;
+        let samples = self.imu.get_or_init(|| {
+            let stamps = self.settings.stamps().map_err(|e| e.to_string())?;
+            let base = self.base().map_err(|e| e.to_string())?;
+            imu::read(&self.recording, name, stamps, &self.tf, base).map_err(|e| with_causes(&e))
+        });
+        samples.clone().map_err(|problem| DataError::new(format!("topic {name}: {problem}")).at(&self.path))
+    }
+
+    fn inertial_state(&self, stamp: Stamp) -> DataResult<Option<InertialState>> {
+        // Only a robot with inertial samples can use it. Biases are not known, which zero stands for.
+        if self.chosen.imu.is_none() {
+            return Ok(None);
+        }
+        let Some(reference) = self.reference() else { return Ok(None) };
+        let Ok(world_from_body) = reference.pose_at(stamp, Span::from_millis(100)) else { return Ok(None) };
+        let velocity = fit_velocity(&reference, stamp);
+        let velocity_m_s = velocity.map_err(|e| DataError::new(e.to_string()).at(&self.path))?;
+        let zero = Vector3::zeros();
+        Ok(Some(InertialState {
+            stamp,
+            world_from_body,
+            velocity_m_s,
+            gyro_bias_rad_s: zero,
+            accel_bias_m_s2: zero,
+        }))
+    }
+
+    fn depth_image(&self, camera: &str, index: usize) -> DataResult<Option<DepthImage>> {
+        let color = self.color(camera)?;
+        let Some(depth) = &self.depth else { return Ok(None) };
+        let Some(stamp) = color.stamps.get(index) else {
+            return Err(DataError::new(format!("no frame {index}, there are {}", color.stamps.len())));
+        };
+        let after = depth.stamps.partition_point(|s| s < stamp);
+        let beside = [after.checked_sub(1), (after < depth.stamps.len()).then_some(after)];
+        let off = |i: &usize| depth.stamps[*i].since(*stamp).abs();
+        let nearest = beside.into_iter().flatten().min_by_key(off).filter(|i| off(i) <= self.depth_offset);
+        nearest.map(|i| self.decode(depth, i, pixels::depth)).transpose()
+    }
+
+    fn has_depth(&self, camera: &str) -> bool {
+        camera == self.camera && self.color.is_some() && self.depth.is_some()
+    }
+
+    fn floor(&self, keyframe: Stamp) -> DataResult<Floor> {
+        let (Some(base), Some(floor)) = (&self.frames.base, &self.frames.floor) else {
+            return Ok(Floor::World(Plane::z_zero()));
+        };
+        if base == floor {
+            return Ok(Floor::Body(Plane::z_zero()));
+        }
+        let chain = self.tf.chain(base, floor).map_err(|e| e.at(&self.path))?;
+        let body_from_floor = chain.at(keyframe).map_err(|e| e.at(&self.path))?;
+        Ok(Floor::Body(Plane::<Sensor>::z_zero().transformed(&body_from_floor.reinterpret())))
+    }
+
+    fn facts(&self) -> Vec<Fact> {
+        facts::facts(self)
+    }
+}

@@ -1,0 +1,80 @@
+//! ROS recordings as VICE data sets: LoCoBot's by default, and any robot's with a camera, tf and odometry.
+//!
+//! ```text
+//! container/   ROS 1 bag, MCAP, sqlite3: one reader; bytes of messages, nothing of what they mean
+//! wire         ROS 1 serialisation and CDR through one reader
+//! message      the messages, each described once
+//! index        the pass over a recording: small messages decoded, images found
+//! tf, urdf     which frame hangs on which
+//! choose       topics and frames: as set, by LoCoBot's names, else by type
+//! streams, imu, calibration, pixels      to the core's conventions
+//! dataset      the data set
+//! ```
+//!
+//! Memory: what stays is the tf tree, the poses, and 32 bytes an image; images are read when they are asked for, and
+//! the few blocks around them are kept, so that a step forward decompresses a block once.
+#![forbid(unsafe_code)]
+
+mod calibration;
+mod choose;
+mod container;
+mod dataset;
+mod facts;
+mod imu;
+mod index;
+mod message;
+mod open;
+mod pixels;
+mod settings;
+mod streams;
+mod tf;
+mod urdf;
+mod wire;
+
+use std::path::{Path, PathBuf};
+
+use vice_core::dataset::{Dataset, DatasetFactory, FormatInfo, OpenOptions, Probe};
+use vice_core::error::DataResult;
+
+/// The name of the format.
+pub const FORMAT: &str = "locobot";
+
+/// The format `locobot`: ROS 1 bags, MCAP files and rosbag2 data bases, alone, in parts, or in their folder.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Locobot;
+
+impl DatasetFactory for Locobot {
+    fn info(&self) -> FormatInfo {
+        FormatInfo {
+            name: FORMAT.to_string(),
+            description: "ROS 1 bag, ROS 2 MCAP or sqlite3 recording of a LoCoBot or another robot"
+                .to_string(),
+            version: env!("CARGO_PKG_VERSION").to_string(),
+            offers: ["images", "depth", "imu", "floor", "streams"].map(str::to_string).to_vec(),
+            settings: settings::infos(),
+        }
+    }
+
+    fn probe(&self, path: &Path) -> Probe {
+        // A description that cannot be used is for `open` to complain about.
+        let Ok(found) = container::find(path) else { return Probe::Yes };
+        match found.as_slice() {
+            [] => Probe::No,
+            [_] => Probe::Yes,
+            several => Probe::Collection(several.iter().filter_map(|f| place_of(path, &f.files)).collect()),
+        }
+    }
+
+    fn open(&self, path: &Path, options: &OpenOptions) -> DataResult<Box<dyn Dataset>> {
+        Ok(Box::new(open::open(path, options)?))
+    }
+}
+
+/// The path by which a recording in a folder can be opened: its file, or the folder that has all of its parts.
+fn place_of(collection: &Path, files: &[PathBuf]) -> Option<PathBuf> {
+    let first = files.first()?;
+    match first.parent() {
+        Some(folder) if folder != collection => Some(folder.to_path_buf()),
+        _ => Some(first.clone()),
+    }
+}
