@@ -28,7 +28,7 @@ impl DatasetFactory for Blackbird {
             name: "blackbird".to_string(),
             description: "flights of the MIT Blackbird data set, with rendered cameras".to_string(),
             version: env!("CARGO_PKG_VERSION").to_string(),
-            offers: ["images", "ground-truth", "imu", "depth", "floor"].map(String::from).to_vec(),
+            offers: ["images", "ground truth", "imu", "depth images", "floor"].map(String::from).to_vec(),
             settings: settings
                 .map(|(key, what)| SettingInfo { key: key.to_string(), description: what.to_string() })
                 .to_vec(),

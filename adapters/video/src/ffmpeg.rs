@@ -92,9 +92,10 @@ impl Ffmpeg {
     /// demuxer is forced, and what the film itself may refer to is limited to files and pipes.
     pub(crate) fn start(&self, film: &Path, input: &[OsString], output: &[OsString]) -> DataResult<Running> {
         let passthrough = self.every_frame_once()?;
-        let real = film.canonicalize().map_err(|e| DataError::new("cannot be read").at(film).because(e))?;
+        let absolute =
+            std::path::absolute(film).map_err(|e| DataError::new("cannot be read").at(film).because(e))?;
         let mut name = OsString::from("file:");
-        name.push(&real);
+        name.push(&absolute);
         let mut command = self.command();
         command
             .args(["-hide_banner", "-nostdin", "-nostats", "-loglevel", "level+info"])
@@ -114,7 +115,7 @@ impl Ffmpeg {
         let (times, shown) = channel();
         let words = Arc::new(Mutex::new(Words::default()));
         let heard = Arc::clone(&words);
-        let listener = std::thread::spawn(move || {
+        let listen = move || {
             let mut stderr = BufReader::new(stderr);
             let mut line = Vec::new();
             while stderr.read_until(b'\n', &mut line).is_ok_and(|n| n > 0) {
@@ -127,8 +128,13 @@ impl Ffmpeg {
                 }
                 line.clear();
             }
-        });
-        Ok(Running { child, stdout: Some(BufReader::new(stdout)), shown, words, listener: Some(listener) })
+        };
+        let stdout = Some(BufReader::new(stdout));
+        let mut running = Running { child, stdout, shown, words, listener: None };
+        let listener = std::thread::Builder::new().spawn(listen);
+        running.listener =
+            Some(listener.map_err(|e| DataError::new("no thread to listen to FFmpeg").because(e))?);
+        Ok(running)
     }
 }
 
@@ -215,10 +221,12 @@ fn complaint(line: &str) -> Option<(bool, String)> {
     })
 }
 
-/// The time in a line of the `metadata` filter: `... frame:3    pts:3072    pts_time:0.3`.
+/// The time in a line of the `metadata` filter: `[Parsed_metadata_3 @ 0x5] [info] frame:3    pts:3072    pts_time:0.3`.
+///
+/// Only lines that begin with the filter's name: a film's title may say anything, but not at the beginning of a line.
 fn shown_time(line: &str) -> Option<i64> {
-    let (head, time) = line.split_once(" pts:")?;
-    if !head.contains("frame:") {
+    let (head, time) = line.strip_prefix("[Parsed_metadata_")?.split_once(" pts:")?;
+    if !head.contains("] frame:") {
         return None;
     }
     time.split_whitespace().next()?.parse().ok()
@@ -246,6 +254,10 @@ mod tests {
         let line = "[Parsed_metadata_2 @ 0x55d] [info] frame:12   pts:20480   pts_time:2.000001\n";
         assert_eq!(shown_time(line), Some(20480));
         assert_eq!(shown_time("[info]   Duration: 00:00:02.00"), None);
+        assert_eq!(
+            shown_time("[info]     title           : [Parsed_metadata_2 @ 0x5] [info] frame:0 pts:9"),
+            None
+        );
         assert_eq!(
             complaint("[mov,mp4 @ 0x5] [error] moov atom not found\n"),
             Some((true, "mov,mp4: moov atom not found".to_string()))

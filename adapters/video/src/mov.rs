@@ -12,8 +12,6 @@ use vice_core::error::{DataError, DataResult};
 
 /// Bytes of `moov` beyond which a film is refused; a day at 120 frames a second needs about 200 MB.
 const MAX_INDEX_BYTES: u64 = 512 << 20;
-/// Boxes inside boxes are searched this far down only by name, so that no nesting can exhaust the stack.
-const TRACK: &[u8; 4] = b"trak";
 
 /// A frame at which decoding may start, in ticks of the track's clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,7 +119,7 @@ fn cut_off(at: u64, what: &str) -> DataError {
 }
 
 fn parse_index(moov: &[u8], file_length: u64) -> DataResult<MovIndex> {
-    let video = boxes(moov).filter(|(kind, _)| kind == TRACK).find(|(_, track)| {
+    let video = boxes(moov).filter(|(kind, _)| kind == b"trak").find(|(_, track)| {
         find(track, &[b"mdia", b"hdlr"]).and_then(|hdlr| hdlr.get(8..12)) == Some(b"vide")
     });
     let (_, track) = video.ok_or_else(|| DataError::new("holds no video"))?;

@@ -100,7 +100,12 @@ fn a_phone_film_gives_frames_and_upright_pictures() {
     let pattern = "testsrc2=size=48x64:rate=30,trim=end_frame=10";
     ffmpeg(&["-f", "lavfi", "-i", pattern, "-c:v", "mpeg4", "-q:v", "2", "lying.mov"]);
     // What a phone held the other way does: the pictures lie, and the film says how to turn them.
-    ffmpeg(&["-i", "lying.mov", "-c", "copy", "-metadata:s:v:0", "rotate=90", "film.mov"]);
+    let mut film = fs::read(folder.path().join("lying.mov")).unwrap();
+    let matrix = film.windows(4).position(|w| w == b"tkhd").unwrap() + 4 + 40;
+    for (i, value) in [0, 0x0001_0000, 0, -0x0001_0000, 0_i32].into_iter().enumerate() {
+        film[matrix + 4 * i..matrix + 4 * i + 4].copy_from_slice(&value.to_be_bytes());
+    }
+    fs::write(folder.path().join("film.mov"), film).unwrap();
     let dataset = open(&folder).unwrap();
     assert_eq!(dataset.frames("camera").unwrap().len(), 10);
     let image = dataset.image("camera", 9).unwrap();

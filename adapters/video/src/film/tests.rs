@@ -74,8 +74,10 @@ fn any_frame_in_any_order_is_the_one_of_a_straight_decode() {
         let mut order: Vec<usize> = vec![89, 0, 1, 2, 40, 39, 12, 11, 10, 9, 75, 80, 20, 29, 30, 31, 3, 88];
         order.extend((0..12).map(|k| (k * 53 + 17) % FRAMES));
         for index in order {
+            let starts = film.stats().starts;
             let image = film.frame(index).unwrap();
             assert!(image.data() == expected[index], "{encoder:?}: frame {index} is another one");
+            assert!(film.stats().starts <= starts + 1, "{encoder:?}: seeking to frame {index} went past it");
         }
         let error = film.frame(FRAMES).unwrap_err().to_string();
         assert!(error.contains("no frame 90, the film has 90"), "{error}");
