@@ -77,11 +77,17 @@ pub(crate) fn checker(at: &Spot, side: f64) -> f64 {
     0.5 + 0.5 * wave(at.s, at.ws) * wave(at.t, at.wt)
 }
 
+/// The cell of a lattice: the largest whole number not above `x`. A processor without SSE 4.1 has no instruction for
+/// `floor`, and this is the innermost loop of the renderer.
+fn cell(x: f64) -> i32 {
+    let whole = x as i32;
+    whole.wrapping_sub(i32::from(x < f64::from(whole)))
+}
+
 /// Smooth noise of one scale, -1 to 1.
 fn noise_octave(s: f64, t: f64, seed: u32) -> f64 {
-    let (is, it) = (s.floor(), t.floor());
-    let (fs, ft) = (s - is, t - it);
-    let (x, y) = (is as i32, it as i32);
+    let (x, y) = (cell(s), cell(t));
+    let (fs, ft) = (s - f64::from(x), t - f64::from(y));
     let value =
         |dx: i32, dy: i32| f64::from(hash(x.wrapping_add(dx), y.wrapping_add(dy), seed)) / 2147483648.0;
     let fade = |f: f64| f * f * (3.0 - 2.0 * f);
@@ -105,19 +111,19 @@ pub(crate) fn noise(at: &Spot, scales: &[(f64, f64)], seed: u32) -> f64 {
 }
 
 /// Small discs and turned squares, at most one a cell: corners that a tracker likes. Added to an albedo.
-pub(crate) fn speckles(at: &Spot, cell: f64, density: f64, amplitude: f64, seed: u32) -> f64 {
+pub(crate) fn speckles(at: &Spot, pitch: f64, density: f64, amplitude: f64, seed: u32) -> f64 {
     let w = at.width();
-    let (x, y) = ((at.s / cell).floor(), (at.t / cell).floor());
-    let h = hash(x as i32, y as i32, seed);
-    let g = hash(x as i32, y as i32, seed ^ 0x5bd1_e995);
-    let keep = resolved(0.5 * cell, w);
+    let (x, y) = (cell(at.s / pitch), cell(at.t / pitch));
+    let h = hash(x, y, seed);
+    let g = hash(x, y, seed ^ 0x5bd1_e995);
+    let keep = resolved(0.5 * pitch, w);
     if keep == 0.0 || unit(h, 0) >= density {
         return 0.0;
     }
-    let radius = cell * (0.1 + 0.14 * unit(h, 1));
-    let reach = cell * 0.5 - radius * 1.42;
-    let ds = at.s - (x + 0.5) * cell - reach * (2.0 * unit(h, 2) - 1.0);
-    let dt = at.t - (y + 0.5) * cell - reach * (2.0 * unit(h, 3) - 1.0);
+    let radius = pitch * (0.1 + 0.14 * unit(h, 1));
+    let reach = pitch * 0.5 - radius * 1.42;
+    let ds = at.s - (f64::from(x) + 0.5) * pitch - reach * (2.0 * unit(h, 2) - 1.0);
+    let dt = at.t - (f64::from(y) + 0.5) * pitch - reach * (2.0 * unit(h, 3) - 1.0);
     let distance = if unit(g, 0) < 0.35 {
         ds.hypot(dt) - radius
     } else {

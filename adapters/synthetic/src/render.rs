@@ -18,6 +18,8 @@ use crate::texture::albedo;
 
 /// Samples along each side of a pixel that lies on an edge.
 const EDGE_SAMPLES: u32 = 4;
+/// Where the dark rim around a box on the floor has faded below a gray level.
+const SHADOW_M: f64 = 0.6;
 
 /// A camera's rays: what stays the same from frame to frame.
 #[derive(Clone, Debug)]
@@ -147,8 +149,8 @@ impl<'a> View<'a> {
                 let boxes = self.scene.solids[1..]
                     .iter()
                     .filter(|solid| solid.stands_on_floor())
-                    .map(|solid| solid.distance_on_floor_m(point))
-                    .fold(f64::MAX, f64::min);
+                    .map(|solid| solid.distance_on_floor_m(point, SHADOW_M))
+                    .fold(f64::INFINITY, f64::min);
                 nook(walls, 0.3, 0.3) * nook(boxes, 0.55, 0.10)
             }
             SurfaceKind::Wall | SurfaceKind::Ceiling => {

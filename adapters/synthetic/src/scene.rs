@@ -144,8 +144,13 @@ impl Solid {
         self.distance_m(point) < 1e-6
     }
 
-    /// Distance of a point from the solid as seen from above, zero over or under it, metres.
-    pub(crate) fn distance_on_floor_m(&self, point: &Point3<f64>) -> f64 {
+    /// Distance of a point from the solid as seen from above, zero over or under it, metres; infinite beyond `limit_m`
+    /// of its outline, which costs much less to find out.
+    pub(crate) fn distance_on_floor_m(&self, point: &Point3<f64>, limit_m: f64) -> f64 {
+        let from_centre = point.coords.xy() - self.world_from_solid.translation.vector.xy();
+        if from_centre.norm_squared() > (self.half_m.xy().norm() + limit_m).powi(2) {
+            return f64::INFINITY;
+        }
         let local = self.world_from_solid.inverse_transform_point(point);
         (local.coords.xy().abs() - self.half_m.xy()).map(|d| d.max(0.0)).norm()
     }
