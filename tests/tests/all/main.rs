@@ -7,3 +7,4 @@ mod euroc_oracle;
 mod evaluate_oracle;
 mod depth_oracle;
 mod trajectory_oracle;
+mod synthetic;
