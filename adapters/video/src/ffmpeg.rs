@@ -155,6 +155,12 @@ impl Running {
         self.stdout.as_mut()
     }
 
+    /// Its process id.
+    #[cfg(test)]
+    pub(crate) fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// What FFmpeg said that was not passed on yet: warnings and errors, in order.
     pub(crate) fn take_words(&self) -> Vec<String> {
         std::mem::take(&mut self.words.lock().unwrap_or_else(PoisonError::into_inner).fresh)

@@ -130,6 +130,26 @@ fn threads_may_ask_for_neighbours_out_of_order() {
     });
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_film_that_is_dropped_leaves_no_process() {
+    if !ffmpeg_is_there() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mov");
+    // Large enough that FFmpeg is stopped by a full pipe, in the middle of the film.
+    let pattern = format!("testsrc2=size=640x480:rate=30,trim=end_frame={FRAMES}");
+    ffmpeg(&["-f", "lavfi", "-i", &pattern, "-c:v", "mpeg4", path.to_str().unwrap()]);
+    let film = Film::open(&path, PixelFormat::Rgb8, Ffmpeg::default()).unwrap();
+    film.frame(0).unwrap();
+    let id = film.state.lock().unwrap().decoder.as_ref().unwrap().running.id();
+    let process = Path::new("/proc").join(id.to_string());
+    assert!(process.exists());
+    drop(film);
+    assert!(!process.exists(), "neither running nor waiting to be waited for");
+}
+
 #[test]
 fn what_ffmpeg_says_is_passed_on() {
     if !ffmpeg_is_there() {
