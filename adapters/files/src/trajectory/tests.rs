@@ -215,26 +215,3 @@ proptest! {
         let (_, _) = (parse(&text), read_relative_rows(Rows::new(text.as_bytes())));
     }
 }
-
-/// A million rows of a TUM file; prints the time with `--nocapture`.
-#[test]
-#[ignore = "a measurement, for a release build"]
-fn a_million_rows_take_half_a_second() {
-    let mut text = String::new();
-    for i in 0..1_000_000_u32 {
-        let x = f64::from(i) * 0.001_234_5;
-        text.push_str(&format!(
-            "{}.{:09} {x:.9} {:.9} {:.9} 0.5 -0.5 0.5 0.5\n",
-            1_403_715_273 + i / 200,
-            (i % 200) * 5_000_000,
-            -x,
-            x * 0.3
-        ));
-    }
-    let start = std::time::Instant::now();
-    let file = stamped(&text);
-    let took = start.elapsed();
-    println!("{} MB in {took:?}", text.len() >> 20);
-    assert_eq!(file.trajectory.len(), 1_000_000);
-    assert!(took.as_secs_f64() < 0.5, "{took:?}");
-}
