@@ -11,6 +11,8 @@
 pub mod cloud;
 pub mod floor;
 mod ply;
+#[cfg(test)]
+mod scene;
 pub mod zmap;
 
 pub use cloud::{Cloud, CloudOptions, load_cloud};

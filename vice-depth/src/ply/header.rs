@@ -7,7 +7,7 @@ use std::collections::HashSet;
 use std::io::BufRead;
 
 use ply_rs::parser::{Parser, Reader};
-use ply_rs::ply::{DefaultElement, Encoding, PropertyType, ScalarType};
+use ply_rs::ply::{DefaultElement, ElementDef, Encoding, PropertyType, ScalarType};
 use vice_core::error::{DataError, DataResult};
 
 /// A header longer than this is no header (1 MiB; real ones have a few hundred bytes).
@@ -89,6 +89,8 @@ pub(crate) struct Element {
     /// As the header claims; nothing is allocated by it.
     pub(crate) count: u64,
     pub(crate) properties: Vec<Property>,
+    /// What ply-rs reads its rows by.
+    pub(crate) definition: ElementDef,
 }
 
 impl Element {
@@ -156,10 +158,11 @@ impl Header {
                 }
             },
         };
-        let element = |e: &ply_rs::ply::ElementDef| Element {
+        let element = |e: &ElementDef| Element {
             name: e.name.clone(),
             count: e.count as u64,
             properties: e.properties.values().map(property).collect(),
+            definition: e.clone(),
         };
         let elements: Vec<Element> = parsed.elements.values().map(element).collect();
         for p in elements.iter().flat_map(|e| &e.properties) {

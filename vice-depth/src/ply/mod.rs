@@ -1,79 +1,103 @@
-//! PLY files: the points of a scan.
+//! PLY files: the points of a scan, or a mesh.
+//!
+//! Text and both binary orders, any order and type of properties, lists, other elements. Read as a stream: nothing
+//! is allocated because a header claims it.
 
 mod header;
+mod number;
+mod rows;
+mod source;
+#[cfg(test)]
+mod tests;
 
 use std::fs::File;
-use std::io::{BufReader, Seek, SeekFrom};
+use std::io::Read;
 use std::path::Path;
 
-use ply_rs::parser::{Parser, Reader};
-use ply_rs::ply::{Property, PropertyAccess, PropertyAccessResult};
 use vice_core::error::{DataError, DataResult};
 
-use header::{Header, Kind};
-
-/// A row of the vertex element.
-struct Vertex([f64; 3]);
-
-impl PropertyAccess for Vertex {
-    fn new() -> Self {
-        Self([f64::NAN; 3])
-    }
-
-    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let axis = match name {
-            "x" => 0,
-            "y" => 1,
-            "z" => 2,
-            _ => return PropertyAccessResult::Ignored,
-        };
-        self.0[axis] = match property {
-            Property::Char(v) => v.into(),
-            Property::UChar(v) => v.into(),
-            Property::Short(v) => v.into(),
-            Property::UShort(v) => v.into(),
-            Property::Int(v) => v.into(),
-            Property::UInt(v) => v.into(),
-            Property::Float(v) => v.into(),
-            Property::Double(v) => v,
-            _ => return PropertyAccessResult::Ignored,
-        };
-        PropertyAccessResult::Set
-    }
-}
+use header::{Element, Header, Kind};
+pub(crate) use rows::PointSink;
+use rows::Rows;
+use source::Source;
 
 /// Reads the points of a PLY file, metres.
-pub(crate) fn read_points(path: &Path) -> DataResult<Vec<[f64; 3]>> {
-    let failed = |e: std::io::Error| DataError::new("cannot be read").because(e).at(path);
-    let mut reader = BufReader::new(File::open(path).map_err(failed)?);
-    let header = Header::read(&mut reader).map_err(|e| e.at(path))?;
-    let vertex = header
-        .index_of("vertex")
-        .map(|i| &header.elements[i])
-        .ok_or_else(|| DataError::new("the PLY file has no element `vertex`").at(path))?;
-    for name in ["x", "y", "z"] {
-        match vertex.index_of(name).map(|i| vertex.properties[i].kind) {
-            Some(Kind::One(_)) => {}
-            Some(Kind::List { .. }) => {
-                return Err(
-                    DataError::new(format!("`{name}` of the vertices is a list, not a number")).at(path)
-                );
-            }
-            None => return Err(DataError::new(format!("the vertices have no property `{name}`")).at(path)),
+pub(crate) fn read_points(path: &Path, sink: &mut impl PointSink) -> DataResult<()> {
+    let (file, length) = open(path)?;
+    points_from(file, length, sink).map_err(|e| e.at(path))
+}
+
+/// Reads points and faces of a PLY file; a face is a polygon of places in the list of points, counted from 0.
+pub(crate) fn read_mesh(
+    path: &Path,
+    points: &mut impl PointSink,
+    face: impl FnMut(&[i64]) -> DataResult<()>,
+) -> DataResult<()> {
+    let (file, length) = open(path)?;
+    mesh_from(file, length, points, face).map_err(|e| e.at(path))
+}
+
+fn points_from(reader: impl Read, length: Option<u64>, sink: &mut impl PointSink) -> DataResult<()> {
+    let (header, mut rows) = begin(reader, length)?;
+    let vertex = needed(&header, "vertex")?;
+    for element in &header.elements[..vertex] {
+        rows.skip(element)?;
+    }
+    rows.points(&header.elements[vertex], sink)
+}
+
+fn mesh_from(
+    reader: impl Read,
+    length: Option<u64>,
+    points: &mut impl PointSink,
+    mut face: impl FnMut(&[i64]) -> DataResult<()>,
+) -> DataResult<()> {
+    let (header, mut rows) = begin(reader, length)?;
+    let (vertex, faces) = (needed(&header, "vertex")?, needed(&header, "face")?);
+    check_faces(&header.elements[faces])?;
+    for (i, element) in header.elements.iter().enumerate().take(vertex.max(faces) + 1) {
+        if i == vertex {
+            rows.points(element, points)?;
+        } else if i == faces {
+            rows.list_rows(element, |row| face(&row.corners))?;
+        } else {
+            rows.skip(element)?;
         }
     }
-    reader.seek(SeekFrom::Start(0)).map_err(failed)?;
-    let broken = |e: ply_rs::parser::ParseError| {
-        DataError::new("the PLY file is cut off or broken").because(e).at(path)
-    };
-    let parser = Parser::<Vertex>::new();
-    let mut reader = Reader::new(reader);
-    let header = parser.read_header(&mut reader).map_err(broken)?;
-    for (name, element) in &header.elements {
-        let rows = parser.read_payload_for_element(&mut reader, element, &header).map_err(broken)?;
-        if name == "vertex" {
-            return Ok(rows.into_iter().map(|v| v.0).collect());
-        }
+    Ok(())
+}
+
+/// Opens a file; its length is known where it is a regular one.
+fn open(path: &Path) -> DataResult<(File, Option<u64>)> {
+    let failed = |e: std::io::Error| DataError::new("cannot be opened").because(e).at(path);
+    let file = File::open(path).map_err(failed)?;
+    let metadata = file.metadata().map_err(failed)?;
+    if metadata.is_dir() {
+        return Err(DataError::new("is a folder, not a PLY file").at(path));
     }
-    Ok(Vec::new())
+    Ok((file, metadata.is_file().then_some(metadata.len())))
+}
+
+fn begin<R: Read>(reader: R, length: Option<u64>) -> DataResult<(Header, Rows<R>)> {
+    let mut source = Source::new(reader, length);
+    let header = Header::read(&mut source)?;
+    let rows = Rows { source, layout: header.layout, line: header.lines };
+    Ok((header, rows))
+}
+
+fn needed(header: &Header, name: &str) -> DataResult<usize> {
+    header.index_of(name).ok_or_else(|| {
+        let names: Vec<&str> = header.elements.iter().map(|e| e.name.as_str()).collect();
+        DataError::new(format!("the PLY file has no element `{name}`"))
+            .hint(format!("it has {}", if names.is_empty() { "none".to_string() } else { names.join(", ") }))
+    })
+}
+
+fn check_faces(element: &Element) -> DataResult<()> {
+    let corners = element.index_of("vertex_indices").or_else(|| element.index_of("vertex_index"));
+    match corners.map(|c| element.properties[c].kind) {
+        Some(Kind::List { item, .. }) if item.is_integer() => Ok(()),
+        Some(_) => Err(DataError::new("the corners of a `face` are not a list of integers")),
+        None => Err(DataError::new("`face` has no list `vertex_indices` or `vertex_index`")),
+    }
 }

@@ -1,100 +1,207 @@
 //! The third step: triangulate the points that are left, in pixels, and interpolate `z` linearly.
 //!
-//! What is interpolated is `z` itself, not `1/z`, over the Delaunay triangulation of the distorted pixels.
+//! What is interpolated is `z` itself, not `1/z`, over the Delaunay triangulation of the distorted pixels. Four
+//! points on a circle have two such triangulations, and a regular grid of points is full of them: to make the
+//! triangulation a property of the points, and not of their order or of what else is triangulated with them, each
+//! pixel is moved by up to a billionth, by a hash of itself.
 
+use rayon::prelude::*;
 use spade::{DelaunayTriangulation, HasPosition, Point2, PositionInTriangulation, Triangulation};
 use vice_core::camera::Pixel;
 use vice_core::depth::{DepthMiss, DepthSample};
 use vice_core::error::{DataError, DataResult};
 
-/// A point of the cloud as the camera sees it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Seen {
-    /// Pixels.
-    pub(crate) u: f64,
-    /// Pixels.
-    pub(crate) v: f64,
-    /// Metres along the optical axis.
-    pub(crate) z_m: f64,
+use super::queries::Queries;
+use super::select::{Facing, Seen, View, Window};
+
+/// Largest shift of a pixel.
+const JITTER_PX: f64 = 1e-9;
+
+/// How far two corners of a triangle may be off each other's patches, over the distance between points.
+const STEP_SPACINGS: f64 = 3.0;
+
+/// The same over the standard deviation across the surface.
+const STEP_NOISE: f64 = 4.0;
+
+/// What makes a triangle unfit to interpolate in.
+#[derive(Clone, Copy)]
+pub(super) struct Limits<'a> {
+    /// Longest edge, pixels.
+    pub(super) width_px: f64,
+    /// Where its patches come from, if a triangle across an occlusion edge is to be told.
+    pub(super) edges_of: Option<&'a View<'a>>,
 }
 
-impl HasPosition for Seen {
+/// A corner of the triangulation, and which point it is.
+struct Corner {
+    at: Point2<f64>,
+    point: u32,
+}
+
+impl HasPosition for Corner {
     type Scalar = f64;
 
     fn position(&self) -> Point2<f64> {
-        Point2::new(self.u, self.v)
+        self.at
     }
 }
 
 /// Triangles over the points in view.
-pub(crate) struct Surface {
-    triangles: DelaunayTriangulation<Seen>,
-    limits: Limits,
+pub(super) struct Surface<'a> {
+    points: Vec<Seen>,
+    triangles: DelaunayTriangulation<Corner>,
+    limits: Limits<'a>,
 }
 
-/// What makes a triangle unfit to interpolate in.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Limits {
-    /// Longest edge, pixels.
-    pub(crate) width_px: f64,
-    /// Largest `z_far / z_near - 1` of its corners.
-    pub(crate) depth_ratio: f64,
+/// Three points and the plane through them.
+struct Triangle {
+    corners: [Seen; 3],
+    slope: [f64; 2],
 }
 
-impl Surface {
+/// What a part of the points says about a pixel.
+pub(super) enum Local {
+    /// No other points can change this.
+    Certain(Result<DepthSample, DepthMiss>),
+    /// It takes more points to know.
+    Uncertain,
+}
+
+impl<'a> Surface<'a> {
     /// Triangulates. Of points at one pixel the nearest is kept, so that their order does not matter.
-    pub(crate) fn new(mut seen: Vec<Seen>, limits: Limits) -> DataResult<Self> {
-        seen.sort_unstable_by(|a, b| {
-            a.u.total_cmp(&b.u).then(a.v.total_cmp(&b.v)).then(a.z_m.total_cmp(&b.z_m))
-        });
-        seen.dedup_by(|b, a| a.u == b.u && a.v == b.v);
-        let triangles = DelaunayTriangulation::bulk_load(seen)
+    pub(super) fn new(mut points: Vec<Seen>, limits: Limits<'a>) -> DataResult<Self> {
+        points.par_iter_mut().for_each(jitter);
+        points.par_sort_unstable_by(by_pixel);
+        points.dedup_by(|b, a| a.u == b.u && a.v == b.v);
+        let corner = |(point, s): (u32, &Seen)| Corner { at: Point2::new(s.u, s.v), point };
+        let corners = (0..).zip(&points).map(corner).collect();
+        let triangles = DelaunayTriangulation::bulk_load(corners)
             .map_err(|e| DataError::new("the projected cloud cannot be triangulated").because(e))?;
-        Ok(Self { triangles, limits })
+        Ok(Self { points, triangles, limits })
     }
 
-    /// Depth of a pixel.
-    pub(crate) fn depth(&self, pixel: Pixel) -> Result<DepthSample, DepthMiss> {
-        if self.triangles.num_vertices() == 0 {
-            return Err(DepthMiss::EmptyView);
-        }
-        if !(pixel.u.is_finite() && pixel.v.is_finite()) {
-            return Err(DepthMiss::OutsideImage);
-        }
-        let at = Point2::new(pixel.u, pixel.v);
-        let corners = match self.triangles.locate(at) {
-            PositionInTriangulation::OnVertex(vertex) => {
-                return Ok(DepthSample::new(self.triangles.vertex(vertex).data().z_m));
-            }
-            PositionInTriangulation::OnFace(face) => self.triangles.face(face).vertices(),
+    /// Depth of a pixel, where these are all the points of a window that is part of a larger one.
+    ///
+    /// The circle through a triangle's corners is free of other points. Where none can lie in the part of it outside
+    /// the window either, the triangle belongs to the triangulation of all points.
+    pub(super) fn local(&self, pixel: Pixel, window: &Window, whole: &Window) -> Local {
+        let face = match self.triangles.locate(Point2::new(pixel.u, pixel.v)) {
+            PositionInTriangulation::OnFace(face) => Some(self.triangles.face(face)),
             PositionInTriangulation::OnEdge(edge) => {
                 let edge = self.triangles.directed_edge(edge);
-                let face = edge.face().as_inner().or_else(|| edge.rev().face().as_inner());
-                face.ok_or(DepthMiss::OutsideHull)?.vertices()
+                edge.face().as_inner().or_else(|| edge.rev().face().as_inner())
             }
-            PositionInTriangulation::OutsideOfConvexHull(_) | PositionInTriangulation::NoTriangulation => {
-                return Err(DepthMiss::OutsideHull);
+            PositionInTriangulation::OnVertex(vertex) => {
+                let vertex = self.triangles.vertex(vertex);
+                vertex.out_edges().find_map(|edge| edge.face().as_inner())
             }
+            _ => None,
         };
-        self.limits.interpolate(corners.map(|c| *c.data()), pixel)
+        let Some(face) = face else { return Local::Uncertain };
+        let (centre, radius_2) = face.circumcircle();
+        let radius = radius_2.sqrt() * (1.0 + 1e-9) + 1e-6;
+        let inside = |at: f64, low: f64, high: f64, first: f64, last: f64| {
+            (at - radius > low || low <= first) && (at + radius < high || high >= last)
+        };
+        let certain = radius.is_finite()
+            && inside(centre.x, window.low.u, window.high.u, whole.low.u, whole.high.u)
+            && inside(centre.y, window.low.v, window.high.v, whole.low.v, whole.high.v);
+        if !certain {
+            return Local::Uncertain;
+        }
+        Local::Certain(self.triangle(face.vertices().map(|v| v.data().point)).depth(&self.limits, pixel))
+    }
+
+    /// Depths of many pixels: each triangle fills those that it covers.
+    pub(super) fn fill(&self, pixels: &[Pixel], wanted: &[usize], out: &mut [Result<DepthSample, DepthMiss>]) {
+        let nothing = if self.points.is_empty() { DepthMiss::EmptyView } else { DepthMiss::OutsideHull };
+        for i in wanted {
+            out[*i] = Err(nothing);
+        }
+        let queries = Queries::new(pixels, wanted);
+        for face in self.triangles.inner_faces() {
+            let triangle = self.triangle(face.vertices().map(|v| v.data().point));
+            let mut unfit = None;
+            queries.covered_by(triangle.corners.map(|c| Pixel::new(c.u, c.v)), |i| {
+                let unfit = *unfit.get_or_insert_with(|| triangle.unfit(&self.limits));
+                // On an edge between two triangles the one that has an answer is taken.
+                if out[i].is_err() {
+                    out[i] = unfit.map_or_else(|| Ok(triangle.at(pixels[i])), Err);
+                }
+            });
+        }
+    }
+
+    fn triangle(&self, points: [u32; 3]) -> Triangle {
+        Triangle::new(points.map(|p| self.points[p as usize]))
     }
 }
 
-impl Limits {
-    /// `z` of the plane through three points at a pixel, in `(u, v, z)`.
-    fn interpolate(&self, [a, b, c]: [Seen; 3], at: Pixel) -> Result<DepthSample, DepthMiss> {
-        let width = |p: Seen, q: Seen| (p.u - q.u).hypot(p.v - q.v);
-        if width(a, b).max(width(b, c)).max(width(c, a)) > self.width_px {
-            return Err(DepthMiss::TriangleTooWide);
-        }
-        let (near, far) = (a.z_m.min(b.z_m).min(c.z_m), a.z_m.max(b.z_m).max(c.z_m));
-        if far > near * (1.0 + self.depth_ratio) {
-            return Err(DepthMiss::OcclusionEdge);
-        }
-        let (bu, bv, cu, cv) = (b.u - a.u, b.v - a.v, c.u - a.u, c.v - a.v);
-        let (pu, pv) = (at.u - a.u, at.v - a.v);
+impl Triangle {
+    /// From three points, in an order of their own, so that rounding does not depend on who asks.
+    fn new(mut corners: [Seen; 3]) -> Self {
+        corners.sort_unstable_by(by_pixel);
+        let [a, b, c] = corners;
+        let (bu, bv, bz) = (b.u - a.u, b.v - a.v, b.z_m - a.z_m);
+        let (cu, cv, cz) = (c.u - a.u, c.v - a.v, c.z_m - a.z_m);
         let area = bu * cv - bv * cu;
-        let (wb, wc) = ((pu * cv - pv * cu) / area, (bu * pv - bv * pu) / area);
-        Ok(DepthSample::new(a.z_m + wb * (b.z_m - a.z_m) + wc * (c.z_m - a.z_m)))
+        Self { corners, slope: [(bz * cv - cz * bv) / area, (bu * cz - cu * bz) / area] }
     }
+
+    /// Depth of a pixel, or why there is none.
+    fn depth(&self, limits: &Limits<'_>, at: Pixel) -> Result<DepthSample, DepthMiss> {
+        self.unfit(limits).map_or_else(|| Ok(self.at(at)), Err)
+    }
+
+    /// Depth on the plane through the corners.
+    fn at(&self, px: Pixel) -> DepthSample {
+        let [a, b, c] = self.corners;
+        let z_m = a.z_m + self.slope[0] * (px.u - a.u) + self.slope[1] * (px.v - a.v);
+        // A needle of a triangle has next to no area to divide by.
+        let (low, high) = (a.z_m.min(b.z_m).min(c.z_m), a.z_m.max(b.z_m).max(c.z_m));
+        DepthSample::new(if z_m.is_finite() { z_m.clamp(low, high) } else { low })
+    }
+
+    fn unfit(&self, limits: &Limits<'_>) -> Option<DepthMiss> {
+        let pairs = [(0, 1), (1, 2), (2, 0)];
+        let too_wide = |(i, j): (usize, usize)| {
+            let (a, b) = (self.corners[i], self.corners[j]);
+            (a.u - b.u).hypot(a.v - b.v) > limits.width_px
+        };
+        if pairs.into_iter().any(too_wide) {
+            return Some(DepthMiss::TriangleTooWide);
+        }
+        let view = limits.edges_of?;
+        let sides = self.corners.map(|c| (in_camera(&c), view.patch(c.leaf)));
+        let step = |(i, j): (usize, usize)| apart(&sides[i], &sides[j]) || apart(&sides[j], &sides[i]);
+        pairs.into_iter().any(step).then_some(DepthMiss::OcclusionEdge)
+    }
+}
+
+/// Whether a point lies off the patch of another by more than sampling and noise explain.
+fn apart(a: &(nalgebra::Vector3<f64>, Facing), b: &(nalgebra::Vector3<f64>, Facing)) -> bool {
+    let off_m = a.1.normal.dot(&(b.0 - a.0)).abs();
+    let spacing_m = a.1.spacing_m.max(b.1.spacing_m);
+    off_m > STEP_SPACINGS * spacing_m + STEP_NOISE * a.1.thickness_m
+}
+
+fn in_camera(seen: &Seen) -> nalgebra::Vector3<f64> {
+    nalgebra::Vector3::new(f64::from(seen.ray[0]), f64::from(seen.ray[1]), 1.0) * seen.z_m
+}
+
+fn by_pixel(a: &Seen, b: &Seen) -> std::cmp::Ordering {
+    a.u.total_cmp(&b.u).then(a.v.total_cmp(&b.v)).then(a.z_m.total_cmp(&b.z_m)).then(a.leaf.cmp(&b.leaf))
+}
+
+/// Moves a pixel by a hash of itself.
+fn jitter(seen: &mut Seen) {
+    let mixed = |mut x: u64| {
+        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        x ^ (x >> 31)
+    };
+    let hash = mixed(seen.u.to_bits().wrapping_add(mixed(seen.v.to_bits())));
+    let shift = |bits: u32| (f64::from(bits) / f64::from(u32::MAX) - 0.5) * 2.0 * JITTER_PX;
+    seen.u += shift(hash as u32);
+    seen.v += shift((hash >> 32) as u32);
 }

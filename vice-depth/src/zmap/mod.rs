@@ -1,25 +1,48 @@
-//! Depth from a scan of the scene: select what is in view, drop what is hidden, interpolate the rest.
+//! Depth from a scan of the scene, in three steps that can be seen apart: [`select`] what is in view, drop what is
+//! hidden ([`occlude`]), [`interpolate`] the rest.
+//!
+//! A few pixels are answered by their neighbourhoods: a window around each is grown until the triangle around the
+//! pixel cannot change any more, which gives the very number that the whole image would. Many pixels, such as a depth
+//! image, are answered by triangulating the whole image once.
 
 mod interpolate;
 mod occlude;
+mod queries;
 mod select;
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 
-use vice_core::camera::Pixel;
+use rayon::prelude::*;
+use vice_core::camera::{Camera, Pixel};
 use vice_core::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
 use vice_core::error::DataResult;
 use vice_core::frames::{self, Rigid, World};
 
 use crate::cloud::Cloud;
-use interpolate::{Limits, Surface};
+use interpolate::{Limits, Local, Surface};
+use occlude::Occlusion;
+use select::{Seen, View, Window};
+
+/// More pixels than this are answered by triangulating the whole image.
+const MOST_WINDOWS: usize = 64;
+
+/// Half the side of the first window around a pixel.
+const FIRST_HALF_PX: f64 = 12.0;
+
+/// A window over this part of the image is not worth a triangulation of its own.
+const LARGEST_PART: f64 = 0.25;
 
 /// How a Z-map is made of a cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ZMapOptions {
-    /// Whether points behind a surface are dropped. Without it the paper's Z-map is reproduced: they leak through.
+    /// Whether points behind a surface are dropped, and pixels on an occlusion edge refused. Without it the paper's
+    /// Z-map is reproduced: points behind a surface leak through. With it, points just outside the image help too,
+    /// so that the hull of the points covers the image.
     pub occlusion: bool,
-    /// Widest triangle that is trusted: its longest edge over the focal length.
+    /// Widest triangle that is trusted: its longest edge over the focal length, by default 0.1, which is 46 pixels
+    /// at a focal length of 460.
     pub max_triangle: f64,
 }
 
@@ -46,6 +69,46 @@ impl ZMapDepth {
     ) -> Self {
         Self { cloud, world_from_cloud, options }
     }
+
+    /// The part of the image plane whose points count.
+    fn region(&self, camera: &Camera) -> Window {
+        Window::image(camera, if self.options.occlusion { Occlusion::reach_px(camera) } else { 0.0 })
+    }
+
+    fn points(&self, view: &View<'_>, window: &Window, region: &Window) -> Vec<Seen> {
+        if self.options.occlusion {
+            Occlusion::new(view).visible(window, region)
+        } else {
+            view.all_seen(window)
+        }
+    }
+
+    fn limits<'a>(&self, view: &'a View<'a>) -> Limits<'a> {
+        let [fx, ..] = view.camera().fx_fy_cx_cy();
+        let edges_of = self.options.occlusion.then_some(view);
+        Limits { width_px: self.options.max_triangle * fx, edges_of }
+    }
+
+    /// The answer of a pixel's neighbourhood, or `None` where it takes the whole image.
+    fn local(
+        &self,
+        view: &View<'_>,
+        region: &Window,
+        pixel: Pixel,
+    ) -> DataResult<Option<Result<DepthSample, DepthMiss>>> {
+        let mut half_px = FIRST_HALF_PX;
+        loop {
+            let window = Window::around(pixel, half_px, region);
+            if window.area_px2() > LARGEST_PART * region.area_px2() {
+                return Ok(None);
+            }
+            let surface = Surface::new(self.points(view, &window, region), self.limits(view))?;
+            if let Local::Certain(answer) = surface.local(pixel, &window, region) {
+                return Ok(Some(answer));
+            }
+            half_px *= 2.0;
+        }
+    }
 }
 
 impl DepthSource for ZMapDepth {
@@ -61,15 +124,30 @@ impl DepthSource for ZMapDepth {
         let Some(world_from_camera) = keyframe.world_from_camera else {
             return Ok(vec![Err(DepthMiss::NoAnchor); pixels.len()]);
         };
+        let camera = keyframe.camera;
         let camera_from_cloud = world_from_camera.inverse() * self.world_from_cloud;
-        let mut seen = select::in_view(&self.cloud, &camera_from_cloud, keyframe.camera);
-        let [fx, ..] = keyframe.camera.fx_fy_cx_cy();
-        let mut limits = Limits { width_px: self.options.max_triangle * fx, depth_ratio: f64::INFINITY };
-        if self.options.occlusion {
-            limits.depth_ratio = 0.1;
-            seen = occlude::visible(seen, limits.depth_ratio);
+        let view = View::new(&self.cloud, camera, &camera_from_cloud);
+        let region = self.region(camera);
+        let mut out = vec![Err(DepthMiss::OutsideImage); pixels.len()];
+        let mut wanted: Vec<usize> = (0..pixels.len()).filter(|i| camera.contains(pixels[*i])).collect();
+        if wanted.len() <= MOST_WINDOWS {
+            let answers: Vec<_> = wanted
+                .par_iter()
+                .map(|i| self.local(&view, &region, pixels[*i]))
+                .collect::<DataResult<_>>()?;
+            let mut open = Vec::new();
+            for (i, answer) in wanted.into_iter().zip(answers) {
+                match answer {
+                    Some(answer) => out[i] = answer,
+                    None => open.push(i),
+                }
+            }
+            wanted = open;
         }
-        let surface = Surface::new(seen, limits)?;
-        Ok(pixels.iter().map(|p| surface.depth(*p)).collect())
+        if !wanted.is_empty() {
+            let surface = Surface::new(self.points(&view, &region, &region), self.limits(&view))?;
+            surface.fill(pixels, &wanted, &mut out);
+        }
+        Ok(out)
     }
 }
