@@ -41,7 +41,10 @@ impl LabelArgs {
     }
 
     /// The labels, or those of the chosen points.
-    pub(crate) fn read(&self, frames: &[vice_core::time::Stamp]) -> anyhow::Result<vice_core::label::LabelSet> {
+    pub(crate) fn read(
+        &self,
+        frames: &[vice_core::time::Stamp],
+    ) -> anyhow::Result<vice_core::label::LabelSet> {
         let labels = vice_files::labels::read(&self.labels, Some(frames))?;
         let wanted = split_list(&self.points);
         if wanted.is_empty() {
@@ -49,7 +52,10 @@ impl LabelArgs {
         }
         labels.select(&wanted).map_err(|unknown| {
             let names: Vec<&str> = labels.points().iter().map(|p| p.name.as_str()).collect();
-            crate::terminal::usage(format!("--points: there is no point {unknown}; there are {}", names.join(", ")))
+            crate::terminal::usage(format!(
+                "--points: there is no point {unknown}; there are {}",
+                names.join(", ")
+            ))
         })
     }
 }
@@ -89,6 +95,8 @@ pub(crate) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
 
 /// Writes a document beside and renames it.
 pub(crate) fn write_text(path: &std::path::Path, text: &str) -> anyhow::Result<()> {
-    vice_files::atomic::write(path, vice_files::atomic::Overwrite::Replace, |out| out.write_all(text.as_bytes()))
-        .with_context(|| format!("cannot write {}", path.display()))
+    vice_files::atomic::write(path, vice_files::atomic::Overwrite::Replace, |out| {
+        out.write_all(text.as_bytes())
+    })
+    .with_context(|| format!("cannot write {}", path.display()))
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use vice_core::dataset::GROUND_TRUTH;
 use vice_files::atomic::Overwrite;
-use vice_files::trajectory::{TrajectoryFormat, write};
+use vice_files::trajectory::{write_euroc, write_kitti, write_tum};
 
 use crate::inputs::DatasetArgs;
 use crate::terminal::Outcome;
@@ -19,9 +19,9 @@ pub(crate) struct Args {
     #[arg(long, value_name = "NAME", default_value = GROUND_TRUTH)]
     stream: String,
     /// Format to write.
-    #[arg(long, value_name = "tum|kitti|euroc")]
-    to: TrajectoryFormat,
-    /// File to write; for KITTI a file of times is written beside it.
+    #[arg(long)]
+    to: Format,
+    /// File to write; for KITTI the stamps go to times.txt beside it.
     #[arg(value_name = "OUT")]
     out: PathBuf,
     /// Replace a file that exists.
@@ -29,10 +29,27 @@ pub(crate) struct Args {
     force: bool,
 }
 
+/// A trajectory format.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Format {
+    /// `t tx ty tz qx qy qz qw`
+    Tum,
+    /// 3x4 matrices, and a file of times
+    Kitti,
+    /// CSV with nanoseconds
+    Euroc,
+}
+
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let dataset = args.dataset.open()?;
     let trajectory = dataset.trajectory(&args.stream)?;
     let overwrite = if args.force { Overwrite::Replace } else { Overwrite::Refuse };
-    write(&args.out, args.to, &trajectory, overwrite)?;
+    match args.to {
+        Format::Tum => write_tum(&args.out, &trajectory, overwrite)?,
+        Format::Kitti => {
+            write_kitti(&args.out, args.out.with_file_name("times.txt"), &trajectory, overwrite)?
+        }
+        Format::Euroc => write_euroc(&args.out, &trajectory, None, overwrite)?,
+    }
     Ok(Outcome::Done)
 }

@@ -25,7 +25,9 @@ const ESTIMATES: [(&str, Colour); 3] =
 
 /// Arguments of `vice demo`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  vice demo\n  vice demo --out demo_out   (keeps the flight, the result and a picture)")]
+#[command(
+    after_help = "Examples:\n  vice demo\n  vice demo --out demo_out   (keeps the flight, the result and a picture)"
+)]
 pub(crate) struct Args {
     /// Folder to keep the flight, the result document and a picture in; it must be empty or new.
     #[arg(long, value_name = "DIR")]
@@ -46,7 +48,8 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         bar.finish_and_clear();
     }
     let document = evaluate_flight(&flight)?;
-    let mut text = "A 10 s flight through a rendered room; four points on the floor are followed.\n".to_string();
+    let mut text =
+        "A 10 s flight through a rendered room; four points on the floor are followed.\n".to_string();
     text.push_str("Three estimates of its motion are evaluated with two sources of depth at key frames:\n\n");
     text.push_str(&table::render(&document));
     text.push('\n');
@@ -72,7 +75,8 @@ fn evaluate_flight(flight: &Synthetic) -> anyhow::Result<ResultDocument> {
     let labels = flight.floor_labels()?;
     let selection = Selection::new(&labels, &frames, &camera, &Window::default())?;
     let truth = flight.trajectory(GROUND_TRUTH)?;
-    let mut streams = vec![Stream { name: GROUND_TRUTH.to_string(), role: Role::Reference, trajectory: truth }];
+    let mut streams =
+        vec![Stream { name: GROUND_TRUTH.to_string(), role: Role::Reference, trajectory: truth }];
     for (name, _) in ESTIMATES {
         let trajectory = flight.trajectory(name)?;
         streams.push(Stream { name: name.to_string(), role: Role::Estimate, trajectory });
@@ -125,7 +129,10 @@ fn in_words(document: &ResultDocument) -> anyhow::Result<String> {
     let (clock_slow, clock_fast) = quiet_and_fast(part(document, "clock-offset", "floor")?)?;
     let zmap = px("exact", "zmap")?;
     let mut text = String::from("What this shows\n");
-    writeln!(text, "- exact: the dots stay on their points ({exact:.4} px). Nothing is wrong, and VICE sees nothing wrong.")?;
+    writeln!(
+        text,
+        "- exact: the dots stay on their points ({exact:.4} px). Nothing is wrong, and VICE sees nothing wrong."
+    )?;
     writeln!(
         text,
         "- drift: {drift:.1} px. The error grows with the time since the key frame: {drift_start:.1} px in the first fifth of each segment, {drift_end:.1} px in the last."
@@ -143,14 +150,20 @@ fn in_words(document: &ResultDocument) -> anyhow::Result<String> {
 
 fn part<'a>(document: &'a ResultDocument, stream: &str, depth: &str) -> anyhow::Result<&'a PixelPart> {
     let mut parts = document.pixel.iter().filter(|p| p.role == Role::Estimate);
-    parts.find(|p| p.stream == stream && p.depth == depth).with_context(|| format!("no result for {stream} with {depth}"))
+    parts
+        .find(|p| p.stream == stream && p.depth == depth)
+        .with_context(|| format!("no result for {stream} with {depth}"))
 }
 
 /// Mean errors in the first and in the last fifth of the segments.
 fn first_and_last(part: &PixelPart) -> anyhow::Result<(f64, f64)> {
     let (mut early, mut late) = (Vec::new(), Vec::new());
     for (i, start) in part.keyframes.iter().enumerate() {
-        let next = part.keyframes.get(i + 1).filter(|n| n.point == start.point).map_or(Stamp::MAX, |n| n.timestamp_ns);
+        let next = part
+            .keyframes
+            .get(i + 1)
+            .filter(|n| n.point == start.point)
+            .map_or(Stamp::MAX, |n| n.timestamp_ns);
         let inside = |s: &&vice_core::result::Sample| {
             s.point == start.point && s.timestamp_ns > start.timestamp_ns && s.timestamp_ns < next
         };
@@ -208,6 +221,9 @@ fn kept(out: &Path) -> anyhow::Result<String> {
     writeln!(text, "\n{out} now holds the flight in the EuRoC layout, result.json and overlay.png")?;
     writeln!(text, "(blue ring: the label; white: exact; green: drift; yellow: clock-offset). Go on with")?;
     writeln!(text, "  vice info {out}")?;
-    writeln!(text, "  vice evaluate {out} --labels {out}/labels/scene.csv --estimate {out}/estimates/drift.txt --depth zmap")?;
+    writeln!(
+        text,
+        "  vice evaluate {out} --labels {out}/labels/scene.csv --estimate {out}/estimates/drift.txt --depth zmap"
+    )?;
     Ok(text)
 }

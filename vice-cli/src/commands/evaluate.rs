@@ -11,7 +11,9 @@ use vice_core::metrics::align::Alignment;
 use vice_core::result::{ResultDocument, Settings};
 use vice_files::calibration::CalibrationFile;
 
-use crate::inputs::{DatasetArgs, LabelArgs, StreamArgs, depth_sources, load_streams, numbers, split_list, write_text};
+use crate::inputs::{
+    DatasetArgs, LabelArgs, StreamArgs, depth_sources, load_streams, numbers, split_list, write_text,
+};
 use crate::report;
 use crate::terminal::{self, Outcome, Verbosity, usage};
 
@@ -107,10 +109,20 @@ fn percent(text: &str) -> Result<f64, String> {
 pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
     let document = document(args, verbosity)?;
     // All texts are made before the first is written, so that a failure leaves nothing half done.
-    let json = args.output.json.as_ref().map(|path| Ok::<_, anyhow::Error>((path, to_json(&document)?))).transpose()?;
-    let csv = args.output.csv.as_ref().map(|path| report::csv::render(&document).map(|t| (path, t))).transpose()?;
-    let latex =
-        args.output.latex.as_ref().map(|path| report::latex::render(&document).map(|t| (path, t))).transpose()?;
+    let json = args
+        .output
+        .json
+        .as_ref()
+        .map(|path| Ok::<_, anyhow::Error>((path, to_json(&document)?)))
+        .transpose()?;
+    let csv =
+        args.output.csv.as_ref().map(|path| report::csv::render(&document).map(|t| (path, t))).transpose()?;
+    let latex = args
+        .output
+        .latex
+        .as_ref()
+        .map(|path| report::latex::render(&document).map(|t| (path, t)))
+        .transpose()?;
     for (path, text) in [json, csv, latex].into_iter().flatten() {
         write_text(path, &text)?;
     }
@@ -151,7 +163,8 @@ fn document(args: &Args, verbosity: Verbosity) -> anyhow::Result<ResultDocument>
     let streams = load_streams(&args.streams, dataset.as_ref(), &used, &selection, calibration.as_ref())?;
     let floor = match args.depth.floor_plane {
         Some([nx, ny, nz, d]) => {
-            let plane = Plane::<World>::new([nx, ny, nz], d).map_err(|e| usage(format!("--floor-plane: {e}")))?;
+            let plane =
+                Plane::<World>::new([nx, ny, nz], d).map_err(|e| usage(format!("--floor-plane: {e}")))?;
             Some(Floor::World(plane))
         }
         None => None,

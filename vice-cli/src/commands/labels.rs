@@ -1,12 +1,12 @@
 //! `vice labels`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use vice_files::atomic::Overwrite;
-use vice_files::labels;
+use vice_files::labels::{self, LabelFormat};
 
 use crate::inputs::DatasetArgs;
-use crate::terminal::{self, Outcome, usage};
+use crate::terminal::{self, Outcome};
 
 /// What to do with labels.
 #[derive(Debug, clap::Subcommand)]
@@ -47,28 +47,27 @@ pub(crate) fn run(command: &Command) -> anyhow::Result<Outcome> {
 fn convert(args: &ConvertArgs) -> anyhow::Result<Outcome> {
     let frames = match &args.dataset {
         Some(path) => {
-            let open = DatasetArgs { path: path.clone(), format: None, settings: vec![], camera: args.camera.clone() };
+            let open = DatasetArgs {
+                path: path.clone(),
+                format: None,
+                settings: vec![],
+                camera: args.camera.clone(),
+            };
             let dataset = open.open()?;
             let camera = open.camera_name(dataset.as_ref())?;
             Some((dataset.name().to_string(), camera.clone(), dataset.frames(&camera)?))
         }
         None => None,
     };
+    // Before the work, so that a wrong name costs nothing.
+    LabelFormat::for_writing(&args.output)?;
     let mut set = labels::read(&args.input, frames.as_ref().map(|(_, _, f)| f.as_ref()))?;
     if let Some((dataset, camera, _)) = frames {
         set.dataset.get_or_insert(dataset);
         set.camera.get_or_insert(camera);
     }
     let overwrite = if args.force { Overwrite::Replace } else { Overwrite::Refuse };
-    match extension(&args.output).as_deref() {
-        Some("csv") => labels::write_csv(&args.output, &set, overwrite)?,
-        Some("json") => labels::write_json(&args.output, &set, overwrite)?,
-        _ => return Err(usage(format!("{}: the name must end in .csv or .json", args.output.display()))),
-    }
+    labels::write(&args.output, &set, overwrite)?;
     terminal::print(&format!("{} points, {} observations\n", set.points().len(), set.observation_count()))?;
     Ok(Outcome::Done)
-}
-
-fn extension(path: &Path) -> Option<String> {
-    path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase)
 }

@@ -11,7 +11,7 @@ use vice_core::metrics::rpe::{Delta, DeltaUnit, PairMode, PairsFrom, Rpe, RpeErr
 use vice_core::metrics::trajectory::{Ape, ApeErrors, Statistics, Summary};
 use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
-use vice_files::trajectory::{ReadOptions, TrajectoryFormat, read_spec};
+use vice_files::trajectory::{ReadOptions, read_spec};
 
 use crate::inputs::{span, span_not_negative, write_text};
 use crate::report::table;
@@ -19,8 +19,10 @@ use crate::terminal::{self, Outcome, usage};
 
 /// Arguments of `vice trajectory`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example: vice trajectory ground_truth.csv estimate.txt --align se3 --delta 1 --delta-unit meters --all-pairs\n\n\
-    Files are TUM, EuRoC CSV or KITTI by their content, or relative motions as rel:FILE.")]
+#[command(
+    after_help = "Example: vice trajectory ground_truth.csv estimate.txt --align se3 --delta 1 --delta-unit meters --all-pairs\n\n\
+    Files are TUM, EuRoC CSV or KITTI by their content, or relative motions as rel:FILE."
+)]
 pub(crate) struct Args {
     /// Reference trajectory.
     #[arg(value_name = "REF")]
@@ -105,6 +107,8 @@ struct RpePart {
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let delta = Delta::new(args.delta, args.delta_unit).map_err(|e| usage(format!("--delta: {e}")))?;
     let (reference, estimate) = (read(args, &args.reference)?, read(args, &args.estimate)?);
+    // As evo: what the reference no longer has is not matched either.
+    let reference = crop(&reference, args.t_start, args.t_end).with_context(|| args.reference.clone())?;
     let matching = match args.interpolate {
         true => Matching::Interpolate { max_gap: args.max_gap },
         false => Matching::Nearest { t_max_diff: args.t_max_diff },
@@ -155,13 +159,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
 
 fn read(args: &Args, spec: &str) -> anyhow::Result<Trajectory> {
     let options = ReadOptions { times: args.times.clone(), index_as_seconds: true };
-    let file = read_spec(spec, &options)?;
-    // Rows that are counted have no clock to cut by.
-    let has_clock = file.format != TrajectoryFormat::Kitti || args.times.is_some();
-    if (args.t_start.is_some() || args.t_end.is_some()) && has_clock {
-        return crop(&file.trajectory, args.t_start, args.t_end).with_context(|| spec.to_string());
-    }
-    Ok(file.trajectory)
+    Ok(read_spec(spec, &options)?.trajectory)
 }
 
 fn stamp(text: &str) -> Result<Stamp, String> {

@@ -18,12 +18,19 @@ pub(crate) fn depth_sources(
     depth_names(args).iter().map(|name| depth_source(name, args, dataset)).collect()
 }
 
-fn depth_source(name: &str, args: &DepthArgs, dataset: &Arc<dyn Dataset>) -> anyhow::Result<Box<dyn DepthSource>> {
+fn depth_source(
+    name: &str,
+    args: &DepthArgs,
+    dataset: &Arc<dyn Dataset>,
+) -> anyhow::Result<Box<dyn DepthSource>> {
     match name {
         "floor" => Ok(Box::new(FloorDepth::new())),
         "zmap" => {
             let cloud = dataset.cloud()?.ok_or_else(|| {
-                anyhow::anyhow!("{} has no point cloud for the depth source zmap (use --depth floor)", dataset.name())
+                anyhow::anyhow!(
+                    "{} has no point cloud for the depth source zmap (use --depth floor)",
+                    dataset.name()
+                )
             })?;
             let points = load_cloud(&cloud, &CloudOptions::default())?;
             let options = ZMapOptions { occlusion: args.zmap_occlusion, ..ZMapOptions::default() };

@@ -50,7 +50,9 @@ impl DatasetArgs {
         let names = dataset.cameras();
         match &self.camera {
             Some(name) if names.contains(name) => Ok(name.clone()),
-            Some(name) => Err(usage(format!("--camera: there is no camera {name}; there are {}", names.join(", ")))),
+            Some(name) => {
+                Err(usage(format!("--camera: there is no camera {name}; there are {}", names.join(", "))))
+            }
             None => names
                 .into_iter()
                 .next()

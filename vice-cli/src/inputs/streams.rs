@@ -13,7 +13,8 @@ use vice_core::metrics::rotation_offset::RotationOffset;
 use vice_core::result::Role;
 use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::{Trajectory, in_other_world};
-use vice_files::calibration::{CalibrationFile, read_body_from_estimate};
+use vice_files::calibration::CalibrationFile;
+use vice_files::rigid_file;
 use vice_files::trajectory::{ReadOptions, read_spec};
 
 use super::open::UsedCamera;
@@ -67,13 +68,14 @@ pub(crate) fn load_streams(
     selection: &Selection<'_>,
     calibration: Option<&CalibrationFile>,
 ) -> anyhow::Result<LoadedStreams> {
-    let time_offset = args.time_offset.or(calibration.and_then(CalibrationFile::time_offset)).unwrap_or(Span::ZERO);
+    let time_offset = args.time_offset.or(calibration.and_then(|c| c.time_offset)).unwrap_or(Span::ZERO);
     let mut loader = Loader { args, dataset, used, selection, reference: None };
     loader.reference = loader.load_reference()?;
     let mut list: Vec<Stream> = loader.reference.iter().cloned().collect();
     for name in split_list(&args.estimate) {
         let trajectory = loader.estimate(&name)?;
-        let trajectory = trajectory.shifted(time_offset).with_context(|| format!("{name} with --time-offset"))?;
+        let trajectory =
+            trajectory.shifted(time_offset).with_context(|| format!("{name} with --time-offset"))?;
         let stream = Stream { name: stream_name(&name, &list), role: Role::Estimate, trajectory };
         if let (Some(reference), false) = (&loader.reference, name == IMU_EULER) {
             warn_of_rotation(reference, &stream, args.max_gap);
@@ -131,7 +133,9 @@ impl Loader<'_> {
         if !path.exists() {
             let streams = self.dataset.streams();
             let streams = if streams.is_empty() { "none".to_string() } else { streams.join(", ") };
-            anyhow::bail!("{option}: {spec} is neither a file nor a stream of the data set (streams: {streams}, {IMU_EULER})");
+            anyhow::bail!(
+                "{option}: {spec} is neither a file nor a stream of the data set (streams: {streams}, {IMU_EULER})"
+            );
         }
         let options = ReadOptions { times: self.args.times.clone(), ..ReadOptions::default() };
         Ok(read_spec(spec, &options)?.trajectory)
@@ -152,7 +156,7 @@ impl Loader<'_> {
                 Ok(Trajectory::from_poses(poses)?)
             }
             file => {
-                let body_from_estimate: Rigid<Body, Sensor> = read_body_from_estimate(file)?;
+                let body_from_estimate: Rigid<Body, Sensor> = rigid_file::read(file)?;
                 let estimate_from_body = body_from_estimate.inverse();
                 Ok(trajectory.map_poses(|_, pose| pose.reinterpret() * estimate_from_body))
             }
@@ -174,11 +178,13 @@ impl Loader<'_> {
             usage(format!("--estimate {IMU_EULER} starts from a reference state: give --reference"))
         })?;
         let start = self.selection.first_keyframe().context("there is no key frame to start from")?;
-        let (_, last) = self.selection.stamp_range(&self.used.frames).context("there is no frame to integrate to")?;
+        let (_, last) =
+            self.selection.stamp_range(&self.used.frames).context("there is no frame to integrate to")?;
         let state = self.start_state(reference, start)?;
         // A little beyond, so that the last frame lies between two states.
         let end = last + Span::from_millis(1000);
-        integrate_euler(&samples, &state, end, GRAVITY_Z_UP_M_S2).with_context(|| format!("--estimate {IMU_EULER}"))
+        integrate_euler(&samples, &state, end, GRAVITY_Z_UP_M_S2)
+            .with_context(|| format!("--estimate {IMU_EULER}"))
     }
 
     fn start_state(&self, reference: &Stream, stamp: Stamp) -> anyhow::Result<InertialState> {
@@ -188,7 +194,9 @@ impl Loader<'_> {
         {
             return Ok(state);
         }
-        let context = || format!("--estimate {IMU_EULER}: the reference has no state at the first key frame, {stamp} ns");
+        let context = || {
+            format!("--estimate {IMU_EULER}: the reference has no state at the first key frame, {stamp} ns")
+        };
         Ok(InertialState {
             stamp,
             world_from_body: reference.trajectory.pose_at(stamp, self.args.max_gap).with_context(context)?,
@@ -203,22 +211,25 @@ impl Loader<'_> {
         let has_reference = self.reference.is_some();
         let anchor = match self.args.anchor.as_deref() {
             Some("reference") if !has_reference => {
-                return Err(usage("--anchor reference: there is no reference; give --reference or --anchor estimate"));
+                return Err(usage(
+                    "--anchor reference: there is no reference; give --reference or --anchor estimate",
+                ));
             }
             Some("estimate") => usize::from(has_reference),
             _ => 0,
         };
         let Some([x, y, z, qx, qy, qz, qw]) = self.args.initial_pose else { return Ok(anchor) };
         if list[anchor].role == Role::Reference {
-            return Err(usage("--initial-pose places an estimate: it needs --anchor estimate or --reference none"));
+            return Err(usage(
+                "--initial-pose places an estimate: it needs --anchor estimate or --reference none",
+            ));
         }
         let wanted = WorldFromBody::try_from_parts([x, y, z], [qw, qx, qy, qz])
             .map_err(|e| usage(format!("--initial-pose: {e}")))?;
         let start = self.selection.first_keyframe().context("there is no key frame for --initial-pose")?;
-        let now = list[anchor]
-            .trajectory
-            .pose_at(start, self.args.max_gap)
-            .with_context(|| format!("--initial-pose: {} has no pose at the first key frame", list[anchor].name))?;
+        let now = list[anchor].trajectory.pose_at(start, self.args.max_gap).with_context(|| {
+            format!("--initial-pose: {} has no pose at the first key frame", list[anchor].name)
+        })?;
         list[anchor].trajectory = in_other_world(&(wanted * now.inverse()), &list[anchor].trajectory);
         Ok(anchor)
     }
@@ -241,7 +252,8 @@ fn stream_name(spec: &str, taken: &[Stream]) -> String {
 /// A constant rotation between the bodies is never corrected, but said.
 fn warn_of_rotation(reference: &Stream, estimate: &Stream, max_gap: Span) {
     let matching = Matching::Interpolate { max_gap };
-    let Ok(pairs) = PosePairs::match_up(&reference.trajectory, &estimate.trajectory, matching, Span::ZERO) else {
+    let Ok(pairs) = PosePairs::match_up(&reference.trajectory, &estimate.trajectory, matching, Span::ZERO)
+    else {
         return;
     };
     let Some(offset) = RotationOffset::find(&pairs).filter(RotationOffset::is_suspicious) else { return };

@@ -8,8 +8,19 @@ use vice_core::result::ResultDocument;
 pub(crate) fn render(document: &ResultDocument) -> anyhow::Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record([
-        "stream", "role", "depth", "points", "mean_px", "std_px", "subsets", "pooled_px", "scored", "skipped",
-        "rmse_3d_m", "aoe_rad", "roe_rad",
+        "stream",
+        "role",
+        "depth",
+        "points",
+        "mean_px",
+        "std_px",
+        "subsets",
+        "pooled_px",
+        "scored",
+        "skipped",
+        "rmse_3d_m",
+        "aoe_rad",
+        "roe_rad",
     ])?;
     let number = |v: Option<f64>| v.map_or_else(String::new, |v| v.to_string());
     for part in &document.pixel {

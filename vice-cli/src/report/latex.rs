@@ -11,14 +11,21 @@ pub(crate) fn render(document: &ResultDocument) -> anyhow::Result<String> {
     let sizes = sizes(document);
     let n = sizes.len();
     let mut text = String::new();
-    writeln!(text, "% {} ({}), camera {}", escape(&document.dataset.name), escape(&document.dataset.format), escape(&document.dataset.camera))?;
+    writeln!(
+        text,
+        "% {} ({}), camera {}",
+        escape(&document.dataset.name),
+        escape(&document.dataset.format),
+        escape(&document.dataset.camera)
+    )?;
     writeln!(text, "\\begin{{tabular}}{{lrrrl{}}}", "r".repeat(2 * n))?;
     writeln!(text, "\\toprule")?;
     writeln!(
         text,
         " & RMSE & AOE & ROE & & \\multicolumn{{{n}}}{{c}}{{$\\Delta$(VICE, GT) px}} & \\multicolumn{{{n}}}{{c}}{{$\\Delta$(VICE, On-Board) px}} \\\\"
     )?;
-    let points: Vec<String> = sizes.iter().map(|s| if *s == 1 { "1 pt".to_string() } else { format!("{s} pts") }).collect();
+    let points: Vec<String> =
+        sizes.iter().map(|s| if *s == 1 { "1 pt".to_string() } else { format!("{s} pts") }).collect();
     let points = points.join(" & ");
     writeln!(text, "Estimate & (m) & (rad) & (rad) & Depth & {points} & {points} \\\\")?;
     writeln!(text, "\\midrule")?;

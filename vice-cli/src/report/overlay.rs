@@ -60,12 +60,24 @@ impl Canvas {
         }
     }
 
+    /// A filled rectangle from its top left corner; what lies outside the image is left out.
+    pub(crate) fn fill(&mut self, (left, top): (i64, i64), (width, height): (i64, i64), colour: Colour) {
+        for row in top.max(0)..(top + height).min(self.height) {
+            for column in left.max(0)..(left + width).min(self.width) {
+                let at = 3 * (row * self.width + column) as usize;
+                self.rgb[at..at + 3].copy_from_slice(&colour);
+            }
+        }
+    }
+
     /// Blends a colour in where `cover` of the distance from the centre is above zero.
     fn shade(&mut self, centre: Pixel, reach_px: f64, colour: Colour, cover: impl Fn(f64) -> f64) {
         let reach = reach_px + 1.0;
         // The casts saturate, so that a point far outside draws nothing.
-        let columns = ((centre.u - reach).floor() as i64).max(0)..=((centre.u + reach).ceil() as i64).min(self.width - 1);
-        let rows = ((centre.v - reach).floor() as i64).max(0)..=((centre.v + reach).ceil() as i64).min(self.height - 1);
+        let columns = ((centre.u - reach).floor() as i64).max(0)
+            ..=((centre.u + reach).ceil() as i64).min(self.width - 1);
+        let rows = ((centre.v - reach).floor() as i64).max(0)
+            ..=((centre.v + reach).ceil() as i64).min(self.height - 1);
         for row in rows {
             for column in columns.clone() {
                 let distance = centre.distance_px(Pixel::new(column as f64, row as f64));

@@ -9,7 +9,10 @@ use crate::terminal::printable;
 pub(crate) fn render(document: &ResultDocument) -> String {
     let sizes = sizes(document);
     let mut grid: Vec<Vec<String>> = Vec::new();
-    let mut head = vec!["estimate", "RMSE_3D m", "AOE rad", "ROE rad", "depth"].into_iter().map(String::from).collect::<Vec<_>>();
+    let mut head = vec!["estimate", "RMSE_3D m", "AOE rad", "ROE rad", "depth"]
+        .into_iter()
+        .map(String::from)
+        .collect::<Vec<_>>();
     for column in ["ref", "est"] {
         for size in &sizes {
             head.push(format!("{column} {size}pt px"));
@@ -50,9 +53,11 @@ fn heading(document: &ResultDocument) -> String {
 }
 
 fn pooled(document: &ResultDocument) -> String {
-    let mut grid = vec![["stream", "role", "depth", "pooled px", "scored", "skipped"].map(String::from).to_vec()];
+    let mut grid =
+        vec![["stream", "role", "depth", "pooled px", "scored", "skipped"].map(String::from).to_vec()];
     for part in &document.pixel {
-        let reasons: Vec<String> = part.skips_by_reason().iter().map(|(r, n)| format!("{n} {}", printable(r))).collect();
+        let reasons: Vec<String> =
+            part.skips_by_reason().iter().map(|(r, n)| format!("{n} {}", printable(r))).collect();
         let skipped = match reasons.is_empty() {
             true => "0".to_string(),
             false => format!("{} ({})", part.skipped.len(), reasons.join(", ")),
@@ -72,7 +77,9 @@ fn pooled(document: &ResultDocument) -> String {
 /// Columns as wide as their widest cell, the first row underlined.
 pub(crate) fn align(grid: &[Vec<String>]) -> String {
     let columns = grid.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |column: usize| grid.iter().filter_map(|r| r.get(column)).map(|c| c.chars().count()).max().unwrap_or(0);
+    let width = |column: usize| {
+        grid.iter().filter_map(|r| r.get(column)).map(|c| c.chars().count()).max().unwrap_or(0)
+    };
     let widths: Vec<usize> = (0..columns).map(width).collect();
     let mut text = String::new();
     for (i, row) in grid.iter().enumerate() {
