@@ -27,6 +27,10 @@ mod open;
 mod pixels;
 mod settings;
 mod streams;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
 mod tf;
 mod urdf;
 mod wire;
@@ -38,6 +42,9 @@ use vice_core::error::DataResult;
 
 /// The name of the format.
 pub const FORMAT: &str = "locobot";
+
+/// Endings of recordings.
+const ENDINGS: [&str; 3] = ["bag", "mcap", "db3"];
 
 /// The format `locobot`: ROS 1 bags, MCAP files and rosbag2 data bases, alone, in parts, or in their folder.
 #[derive(Clone, Copy, Debug, Default)]
@@ -59,6 +66,10 @@ impl DatasetFactory for Locobot {
         // A description that cannot be used is for `open` to complain about.
         let Ok(found) = container::find(path) else { return Probe::Yes };
         match found.as_slice() {
+            // A recording that was never written to is for `open` to explain.
+            [] if path.is_file() && ENDINGS.iter().any(|e| path.extension().is_some_and(|x| x == *e)) => {
+                Probe::Yes
+            }
             [] => Probe::No,
             [_] => Probe::Yes,
             several => Probe::Collection(several.iter().filter_map(|f| place_of(path, &f.files)).collect()),

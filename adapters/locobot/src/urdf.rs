@@ -152,7 +152,7 @@ mod tests {
     #[test]
     fn mistakes_have_a_line() {
         let error = |text: &str| parse(text).unwrap_err().to_string();
-        assert!(error("<robot>\n<joint").starts_with("line 2: the URDF is not XML"));
+        assert!(error("<robot>\n</joint>").starts_with("line 2: the URDF is not XML"));
         let zero = "<robot>\n\n<joint name='j' type='revolute'><parent link='a'/><child link='b'/><axis xyz='0 0 0'/></joint></robot>";
         assert_eq!(error(zero), "line 3: joint j has a zero axis");
         assert!(

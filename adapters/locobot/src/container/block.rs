@@ -62,6 +62,13 @@ pub(super) struct Block {
     pub(super) cut: bool,
 }
 
+impl Block {
+    /// Whether parts of it can be read by themselves: neither compressed nor under a check sum.
+    fn is_plain(&self) -> bool {
+        self.compression == Compression::None && self.crc.is_none()
+    }
+}
+
 /// Decompresses; gives what came out and, where that is not everything, why.
 pub(super) fn decompress(
     compression: Compression,
@@ -284,7 +291,7 @@ impl BlockFile {
     /// Reads a message.
     pub(super) fn read(&self, blocks: &[Block], at: &Locator) -> DataResult<Payload> {
         let block = &blocks[at.block as usize];
-        if block.compression == Compression::None && block.crc.is_none() {
+        if block.is_plain() {
             return Ok(Payload::Alone(self.read_vec(block.offset + at.at, u64::from(at.bytes))?));
         }
         let bytes = self.cached(at.block, block)?;
@@ -308,7 +315,7 @@ impl BlockFile {
         let mut state = State::default();
         let mut at = 0;
         while at < blocks.len() {
-            if blocks[at].compression == Compression::None {
+            if blocks[at].is_plain() {
                 let block = &blocks[at];
                 let mut source = self.window_of(block.offset, block.stored);
                 let walked = records.walk(&mut source, (file, at as u32), &mut state, scan, visitor);
@@ -318,7 +325,7 @@ impl BlockFile {
                 at += 1;
                 continue;
             }
-            let batch = blocks[at..].iter().take_while(|b| b.compression != Compression::None);
+            let batch = blocks[at..].iter().take_while(|b| !b.is_plain());
             let batch: Vec<&Block> = batch.take(rayon::current_num_threads().min(16)).collect();
             let loaded: Vec<_> = batch.par_iter().map(|block| self.load(block)).collect();
             for (block, (bytes, problem)) in batch.into_iter().zip(loaded) {
