@@ -109,6 +109,7 @@ pub(crate) fn look(camera: &Camera, from: [f64; 3], to: [f64; 3]) -> Keyframe<'_
 
 /// Every `step`th pixel of an image.
 pub(crate) fn grid(camera: &Camera, step: usize) -> Vec<Pixel> {
-    let columns = move |v: u32| (0..camera.width()).step_by(step).map(move |u| Pixel::new(u.into(), v.into()));
+    let columns =
+        move |v: u32| (0..camera.width()).step_by(step).map(move |u| Pixel::new(u.into(), v.into()));
     (0..camera.height()).step_by(step).flat_map(columns).collect()
 }

@@ -143,7 +143,7 @@ mod tests {
     use super::*;
     use crate::scene::{Scene, camera, grid, look};
     use std::sync::atomic::{AtomicUsize, Ordering};
-    use vice_core::camera::{Camera, Model};
+    use vice_core::camera::Camera;
     use vice_core::dataset::Image;
     use vice_core::frames::BodyFromCamera;
     use vice_core::time::Stamp;
@@ -250,8 +250,11 @@ mod tests {
         let z_m = grid(&camera, 1).into_iter().map(|px| scene.depth(&keyframe, px) as f32).collect();
         let image = DepthImage::new(Stamp::default(), 752, 480, z_m).unwrap();
         let (_, source) = source(Some(image), ZCamOptions::default());
-        let pixels: Vec<Pixel> =
-            grid(&camera, 5).into_iter().map(|p| Pixel::new(p.u + 0.37, p.v + 0.61)).filter(|p| camera.contains(*p)).collect();
+        let pixels: Vec<Pixel> = grid(&camera, 5)
+            .into_iter()
+            .map(|p| Pixel::new(p.u + 0.37, p.v + 0.61))
+            .filter(|p| camera.contains(*p))
+            .collect();
         let depths = source.depths(&keyframe, &pixels).unwrap();
         let mut flagged = 0;
         for (px, depth) in pixels.iter().zip(depths) {

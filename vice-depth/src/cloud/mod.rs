@@ -20,8 +20,8 @@ use vice_core::error::{DataError, DataResult};
 
 use crate::ply::{self, PointSink};
 use collect::Collector;
-pub(crate) use tree::{Bounds, Leaf, Overlap, Patch};
 use tree::Tree;
+pub(crate) use tree::{Bounds, Leaf, Overlap, Patch};
 
 /// Bytes a point takes, its share of the index included.
 const BYTES_PER_POINT: u64 = 15;

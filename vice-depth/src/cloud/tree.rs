@@ -133,13 +133,7 @@ impl Tree {
         found
     }
 
-    fn visit(
-        &self,
-        node: Node,
-        inside: bool,
-        overlap: &impl Fn(&Bounds) -> Overlap,
-        found: &mut Vec<Leaf>,
-    ) {
+    fn visit(&self, node: Node, inside: bool, overlap: &impl Fn(&Bounds) -> Overlap, found: &mut Vec<Leaf>) {
         let inside = inside
             || match overlap(&self.boxes[node.at]) {
                 Overlap::Outside => return,

@@ -113,7 +113,12 @@ impl<'a> Surface<'a> {
     }
 
     /// Depths of many pixels: each triangle fills those that it covers.
-    pub(super) fn fill(&self, pixels: &[Pixel], wanted: &[usize], out: &mut [Result<DepthSample, DepthMiss>]) {
+    pub(super) fn fill(
+        &self,
+        pixels: &[Pixel],
+        wanted: &[usize],
+        out: &mut [Result<DepthSample, DepthMiss>],
+    ) {
         let nothing = if self.points.is_empty() { DepthMiss::EmptyView } else { DepthMiss::OutsideHull };
         for i in wanted {
             out[*i] = Err(nothing);

@@ -31,6 +31,9 @@ const MOST_WINDOWS: usize = 64;
 /// Half the side of the first window around a pixel.
 const FIRST_HALF_PX: f64 = 12.0;
 
+/// How far outside the image points are taken in, over the focal length, so that their hull covers it.
+const MARGIN: f64 = 0.03;
+
 /// A window over this part of the image is not worth a triangulation of its own.
 const LARGEST_PART: f64 = 0.25;
 
@@ -70,17 +73,14 @@ impl ZMapDepth {
         Self { cloud, world_from_cloud, options }
     }
 
-    /// The part of the image plane whose points count.
+    /// The part of the image plane whose points are triangulated.
     fn region(&self, camera: &Camera) -> Window {
-        Window::image(camera, if self.options.occlusion { Occlusion::reach_px(camera) } else { 0.0 })
+        let [fx, ..] = camera.fx_fy_cx_cy();
+        Window::image(camera, if self.options.occlusion { MARGIN * fx } else { 0.0 })
     }
 
-    fn points(&self, view: &View<'_>, window: &Window, region: &Window) -> Vec<Seen> {
-        if self.options.occlusion {
-            Occlusion::new(view).visible(window, region)
-        } else {
-            view.all_seen(window)
-        }
+    fn points(&self, view: &View<'_>, window: &Window) -> Vec<Seen> {
+        if self.options.occlusion { Occlusion::new(view).visible(window) } else { view.all_seen(window) }
     }
 
     fn limits<'a>(&self, view: &'a View<'a>) -> Limits<'a> {
@@ -98,11 +98,11 @@ impl ZMapDepth {
     ) -> DataResult<Option<Result<DepthSample, DepthMiss>>> {
         let mut half_px = FIRST_HALF_PX;
         loop {
-            let window = Window::around(pixel, half_px, region);
+            let window = Window::around(pixel, half_px).within(region);
             if window.area_px2() > LARGEST_PART * region.area_px2() {
                 return Ok(None);
             }
-            let surface = Surface::new(self.points(view, &window, region), self.limits(view))?;
+            let surface = Surface::new(self.points(view, &window), self.limits(view))?;
             if let Local::Certain(answer) = surface.local(pixel, &window, region) {
                 return Ok(Some(answer));
             }
@@ -145,7 +145,7 @@ impl DepthSource for ZMapDepth {
             wanted = open;
         }
         if !wanted.is_empty() {
-            let surface = Surface::new(self.points(&view, &region, &region), self.limits(&view))?;
+            let surface = Surface::new(self.points(&view, &region), self.limits(&view))?;
             surface.fill(pixels, &wanted, &mut out);
         }
         Ok(out)

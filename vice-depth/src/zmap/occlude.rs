@@ -18,7 +18,7 @@ use super::select::{Facing, Seen, View, Window};
 const DISC_RADIUS: f64 = 1.6;
 
 /// Largest radius of a disc, cells.
-const MAX_RADIUS_CELLS: f64 = 16.0;
+const MAX_RADIUS_CELLS: f64 = 32.0;
 
 /// Cells a focal length has: a cell is about two milliradians wide, or a pixel if that is more.
 const CELLS_PER_FOCAL_LENGTH: f64 = 500.0;
@@ -56,13 +56,13 @@ impl<'a> Occlusion<'a> {
     }
 
     /// How far from a point, in pixels, others can have a say in whether it is hidden.
-    pub(super) fn reach_px(camera: &Camera) -> f64 {
-        (MAX_RADIUS_CELLS + 1.0) * (focal_px(camera) / CELLS_PER_FOCAL_LENGTH).max(1.0)
+    fn reach_px(&self) -> f64 {
+        (MAX_RADIUS_CELLS + 1.0) * self.cell_px
     }
 
-    /// Points of a window that nothing hides, in the order of the index. Nothing outside `limit` counts.
-    pub(super) fn visible(&self, window: &Window, limit: &Window) -> Vec<Seen> {
-        let around = window.grown(Self::reach_px(self.view.camera()), limit);
+    /// Points of a window that nothing hides, in the order of the index.
+    pub(super) fn visible(&self, window: &Window) -> Vec<Seen> {
+        let around = window.grown(self.reach_px());
         let leaves = self.view.leaves(&around);
         let chunk = leaves.len().div_ceil(rayon::current_num_threads()).max(64);
         let buffer = leaves
@@ -142,8 +142,10 @@ fn focal_px(camera: &Camera) -> f64 {
 
 impl Buffer {
     fn index(&self, column: i64, row: i64) -> Option<usize> {
-        let (column, row) = (usize::try_from(column - self.first[0]).ok()?, usize::try_from(row - self.first[1]).ok()?);
-        (column < self.columns && row < self.nearest.len() / self.columns).then_some(row * self.columns + column)
+        let (column, row) =
+            (usize::try_from(column - self.first[0]).ok()?, usize::try_from(row - self.first[1]).ok()?);
+        (column < self.columns && row < self.nearest.len() / self.columns)
+            .then_some(row * self.columns + column)
     }
 
     fn get(&self, column: i64, row: i64) -> u64 {

@@ -29,8 +29,14 @@ impl<'a> Queries<'a> {
         }
         let size = |axis: usize| if wanted.is_empty() { 0 } else { (high[axis] - low[axis] + 1) as usize };
         let (columns, rows) = (size(0), size(1));
-        let mut queries =
-            Self { pixels, first: low, columns, rows, starts: vec![0; columns * rows + 1], entries: vec![0; wanted.len()] };
+        let mut queries = Self {
+            pixels,
+            first: low,
+            columns,
+            rows,
+            starts: vec![0; columns * rows + 1],
+            entries: vec![0; wanted.len()],
+        };
         for i in wanted {
             let at = queries.index_of(pixels[*i]);
             queries.starts[at + 1] += 1;

@@ -57,17 +57,25 @@ impl Window {
         }
     }
 
-    /// What lies within `half_px` of a pixel, and within `limit`.
-    pub(crate) fn around(at: Pixel, half_px: f64, limit: &Self) -> Self {
-        Self { low: at, high: at }.grown(half_px, limit)
+    /// What lies within `half_px` of a pixel.
+    pub(crate) fn around(at: Pixel, half_px: f64) -> Self {
+        Self { low: at, high: at }.grown(half_px)
     }
 
-    /// With a margin around it, within `limit`.
-    pub(crate) fn grown(&self, margin_px: f64, limit: &Self) -> Self {
+    /// With a margin around it.
+    pub(crate) fn grown(&self, margin_px: f64) -> Self {
         let (low, high) = (self.low, self.high);
         Self {
-            low: Pixel::new((low.u - margin_px).max(limit.low.u), (low.v - margin_px).max(limit.low.v)),
-            high: Pixel::new((high.u + margin_px).min(limit.high.u), (high.v + margin_px).min(limit.high.v)),
+            low: Pixel::new(low.u - margin_px, low.v - margin_px),
+            high: Pixel::new(high.u + margin_px, high.v + margin_px),
+        }
+    }
+
+    /// The part of it that lies in another.
+    pub(crate) fn within(&self, other: &Self) -> Self {
+        Self {
+            low: Pixel::new(self.low.u.max(other.low.u), self.low.v.max(other.low.v)),
+            high: Pixel::new(self.high.u.min(other.high.u), self.high.v.min(other.high.v)),
         }
     }
 
@@ -158,7 +166,8 @@ impl<'a> View<'a> {
                 (Vector3::new(0.0, -1.0, low[1]), 0.0),
             ]);
         }
-        let stored = |(n, d): (Vector3<f64>, f64)| (self.rotation.transpose() * n, d + n.dot(&self.translation));
+        let stored =
+            |(n, d): (Vector3<f64>, f64)| (self.rotation.transpose() * n, d + n.dot(&self.translation));
         in_camera.into_iter().map(stored).collect()
     }
 
