@@ -274,7 +274,12 @@ impl Dataset for RosDataset {
         if base == floor {
             return Ok(Floor::Body(Plane::z_zero()));
         }
-        let chain = self.tf.chain(base, floor).map_err(|e| e.at(&self.path))?;
+        let chain = match self.tf.chain(base, floor) {
+            Ok(chain) => chain,
+            // A base_footprint of some other tree was not asked for.
+            Err(_) if self.settings.get("floor_frame").is_none() => return Ok(Floor::World(Plane::z_zero())),
+            Err(e) => return Err(e.at(&self.path)),
+        };
         let body_from_floor = chain.at(keyframe).map_err(|e| e.at(&self.path))?;
         Ok(Floor::Body(Plane::<Sensor>::z_zero().transformed(&body_from_floor.reinterpret())))
     }

@@ -41,7 +41,8 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> DataResult<RosDataset>
     let recording = Recording::open(&found)?;
     let mut index = Index::new(settings.stamps()?);
     let scan = recording.scan(&mut index)?;
-    let mut damage = scan.damage;
+    let mut damage = Vec::new();
+    warn(scan.damage, &mut damage);
     let broken = index.broken_lines(&recording, &scan.topics);
     warn(broken, &mut damage);
     let topics = scan.topics;
@@ -104,7 +105,7 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> DataResult<RosDataset>
     let ground_truth = GroundTruth::choose(&settings, &names)?;
     let camera = color.as_ref().map_or_else(|| "camera".to_string(), |c| camera_name(&c.topic));
     Ok(RosDataset {
-        name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        name: name_of(path),
         path: path.to_path_buf(),
         fixed_camera: settings.body_from_camera()?,
         settings,
@@ -128,6 +129,13 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> DataResult<RosDataset>
 fn warn(lines: Vec<String>, damage: &mut Vec<String>) {
     lines.iter().for_each(|line| tracing::warn!("{line}"));
     damage.extend(lines);
+}
+
+/// The name of a file without its ending, or that of a folder.
+fn name_of(path: &Path) -> String {
+    let whole = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    let name = if whole.is_dir() { whole.file_name() } else { whole.file_stem() };
+    name.unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Why nothing was found: the first bytes of a file say more than that it is not known.

@@ -127,18 +127,28 @@ fn raw_image(head: &ImageHead<'_>, data: &[u8]) -> DataResult<Image> {
     }
 }
 
+/// A count of `16UC1` in metres. Bit for bit what [`image_file::decode_depth_png`] gives, and four at once.
+fn metres(count: u16) -> f32 {
+    f32::from(count) / 1000.0
+}
+
 fn raw_depth(head: &ImageHead<'_>, data: &[u8]) -> DataResult<DepthImage> {
     let (width, height) = (head.width, head.height);
     let capacity = || Vec::with_capacity(width as usize * height as usize);
-    let metres = |count: u16| (f64::from(count) * METRES_PER_COUNT) as f32;
     let mut z_m: Vec<f32>;
     match head.encoding {
         "16UC1" | "mono16" => {
             let rows = rows(head, data, 2)?;
             z_m = capacity();
-            let big = head.big_endian;
-            let count = |b: &[u8; 2]| if big { u16::from_be_bytes(*b) } else { u16::from_le_bytes(*b) };
-            rows.for_each(|row| z_m.extend(row.as_chunks::<2>().0.iter().map(|b| metres(count(b)))));
+            // Two loops, so that neither asks for the byte order at each pixel.
+            match head.big_endian {
+                true => rows.for_each(|row| {
+                    z_m.extend(row.as_chunks::<2>().0.iter().map(|b| metres(u16::from_be_bytes(*b))));
+                }),
+                false => rows.for_each(|row| {
+                    z_m.extend(row.as_chunks::<2>().0.iter().map(|b| metres(u16::from_le_bytes(*b))));
+                }),
+            }
         }
         "32FC1" => {
             let rows = rows(head, data, 4)?;
@@ -207,6 +217,14 @@ mod tests {
         floats.extend(f32::NAN.to_le_bytes());
         let depth = raw_depth(&head("32FC1", 2, 1, 8, false), &floats).unwrap();
         assert_eq!((depth.get(0, 0), depth.get(1, 0)), (Some(1.5), None));
+    }
+
+    #[test]
+    fn raw_and_compressed_depth_have_the_same_bits() {
+        for count in 0..=u16::MAX {
+            let compressed = (f64::from(count) * METRES_PER_COUNT) as f32;
+            assert_eq!(metres(count).to_bits(), compressed.to_bits(), "{count}");
+        }
     }
 
     #[test]

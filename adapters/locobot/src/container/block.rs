@@ -63,6 +63,12 @@ pub(super) struct Block {
 }
 
 impl Block {
+    /// Records that stand in the file as they are, outside of chunks.
+    pub(super) fn plain(from: u64, to: u64) -> Self {
+        let size = to - from;
+        Self { offset: from, stored: size, size, compression: Compression::None, crc: None, cut: false }
+    }
+
     /// Whether parts of it can be read by themselves: neither compressed nor under a check sum.
     fn is_plain(&self) -> bool {
         self.compression == Compression::None && self.crc.is_none()
@@ -184,6 +190,8 @@ pub(super) struct State {
     pub(super) topics: std::collections::HashMap<u32, usize>,
     /// Name of a schema.
     pub(super) schemas: std::collections::HashMap<u16, String>,
+    /// Messages whose connection or channel was never described.
+    pub(super) orphans: u64,
 }
 
 type Decompressed = Result<Arc<Vec<u8>>, String>;
@@ -345,6 +353,10 @@ impl BlockFile {
                 }
                 at += 1;
             }
+        }
+        if state.orphans > 0 {
+            let problem = format!("{} messages of unknown topics are left out", state.orphans);
+            scan.damaged(&DataError::new(problem).at(path));
         }
     }
 }

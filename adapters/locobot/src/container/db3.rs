@@ -7,6 +7,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use rusqlite::types::ValueRef;
 use rusqlite::{Connection, OpenFlags};
 use vice_core::error::{DataError, DataResult};
 use vice_core::time::Stamp;
@@ -24,6 +25,8 @@ pub(super) struct Db3 {
     connection: Mutex<Connection>,
     /// Each message is compressed with zstd.
     compressed: bool,
+    /// Bytes of the file, more than which no message can have.
+    len: u64,
 }
 
 /// Whether a data base has the tables of rosbag2.
@@ -54,7 +57,8 @@ fn failed(what: impl Into<String>) -> impl FnOnce(rusqlite::Error) -> DataError 
 impl Db3 {
     pub(super) fn open(path: &Path, compressed: bool) -> DataResult<Self> {
         let connection = connect(path).map_err(|e| failed("the data base cannot be opened")(e).at(path))?;
-        Ok(Self { path: path.to_path_buf(), connection: Mutex::new(connection), compressed })
+        let len = path.metadata().map_or(0, |m| m.len());
+        Ok(Self { path: path.to_path_buf(), connection: Mutex::new(connection), compressed, len })
     }
 
     fn lock(&self) -> MutexGuard<'_, Connection> {
@@ -80,8 +84,7 @@ impl Db3 {
         let name = || format!("message {row} cannot be read");
         let mut blob = connection.blob_open("main", "messages", "data", row, true).map_err(failed(name()))?;
         let size = blob.len() as u64;
-        let file_len = std::fs::metadata(&self.path).map_or(0, |m| m.len());
-        if size > MAX_MESSAGE_BYTES.min(file_len) {
+        if size > MAX_MESSAGE_BYTES.min(self.len) {
             return Err(DataError::new(format!("message {row} claims {size} bytes")));
         }
         let read = |e: std::io::Error| DataError::new(format!("message {row} cannot be read: {e}"));
@@ -109,9 +112,15 @@ impl Db3 {
     ) -> DataResult<()> {
         let connection = self.lock();
         let wrong = || failed("the table of messages is damaged");
-        let mut query = connection
-            .prepare("SELECT id, topic_id, timestamp FROM messages WHERE id > ?1 ORDER BY id")
-            .map_err(wrong())?;
+        // Messages that are wanted as a whole come with their row; of images only the first bytes are touched.
+        let whole = topics.iter().filter(|(_, t)| scan.wants[**t] == Want::All && !self.compressed);
+        let whole: Vec<String> = whole.map(|(id, _)| id.to_string()).collect();
+        let query = format!(
+            "SELECT id, topic_id, timestamp, CASE WHEN topic_id IN ({}) THEN data END FROM messages \
+             WHERE id > ?1 ORDER BY id",
+            whole.join(",")
+        );
+        let mut query = connection.prepare(&query).map_err(wrong())?;
         let mut rows = query.query([*last]).map_err(wrong())?;
         while let Some(row) = rows.next().map_err(wrong())? {
             let id: i64 = row.get(0).map_err(wrong())?;
@@ -126,10 +135,17 @@ impl Db3 {
             if want == Want::Nothing {
                 continue;
             }
-            let bytes = self.message(&connection, id, want == Want::Head)?;
+            let read;
+            let bytes = match row.get_ref(3).map_err(wrong())? {
+                ValueRef::Blob(bytes) => bytes,
+                _ => {
+                    read = self.message(&connection, id, want == Want::Head)?;
+                    &read
+                }
+            };
             let locator = Locator { file, block: 0, at: id as u64, bytes: 0 };
             let encoding = scan.topics[topic].encoding;
-            visitor.message(&Message { topic, encoding, recorded, bytes: &bytes, locator });
+            visitor.message(&Message { topic, encoding, recorded, bytes, locator });
         }
         Ok(())
     }

@@ -78,7 +78,8 @@ pub(crate) fn find(path: &Path) -> DataResult<Vec<Found>> {
             return Ok(Vec::new());
         }
         // A file of a rosbag2 folder: its description says whether messages are compressed.
-        let described = parent.map(described).transpose()?.flatten();
+        // That other files of it are missing is no reason not to read this one.
+        let described = parent.and_then(|folder| described(folder).ok().flatten());
         let compressed_messages = described.is_some_and(|d| d.compressed_messages);
         return Ok(vec![Found { files: vec![path.to_path_buf()], compressed_messages }]);
     }

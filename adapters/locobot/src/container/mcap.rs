@@ -40,7 +40,7 @@ pub(super) fn open(path: &Path) -> DataResult<Mcap> {
     let mut loose: Option<u64> = None;
     let mut damage = None;
     let mut at = MAGIC.len() as u64;
-    let mut closed = false;
+    let (mut closed, mut in_summary) = (false, false);
     while !closed {
         let Some((opcode, len)) = prefix(&mut source, at)? else {
             let problem = "the file is cut off: it was not closed or not copied to its end";
@@ -57,7 +57,9 @@ pub(super) fn open(path: &Path) -> DataResult<Mcap> {
         if in_run && !cut {
             loose.get_or_insert(at);
         } else if let Some(from) = loose.take() {
-            blocks.push(plain(from, at));
+            // The summary repeats schemas and channels, which helps where the chunk with the first mention is damaged.
+            let place = if in_summary { 0 } else { blocks.len() };
+            blocks.insert(place, Block::plain(from, at));
         }
         match opcode {
             0 => {
@@ -68,7 +70,8 @@ pub(super) fn open(path: &Path) -> DataResult<Mcap> {
                 Ok(block) => blocks.push(block),
                 Err(e) => damage = Some(e.at(path).byte(at)),
             },
-            op::DATA_END | op::FOOTER => closed = true,
+            op::DATA_END => in_summary = true,
+            op::FOOTER => closed = true,
             _ => {}
         }
         if cut {
@@ -77,7 +80,7 @@ pub(super) fn open(path: &Path) -> DataResult<Mcap> {
         at = end;
     }
     if let Some(from) = loose {
-        blocks.push(plain(from, at));
+        blocks.push(Block::plain(from, at));
     }
     if blocks.is_empty() {
         let error = DataError::new("the file has no messages").at(path);
@@ -103,11 +106,6 @@ impl Container for Mcap {
     fn byte(&self, locator: &Locator) -> Option<u64> {
         self.blocks.get(locator.block as usize).map(|b| b.offset)
     }
-}
-
-fn plain(from: u64, to: u64) -> Block {
-    let size = to - from;
-    Block { offset: from, stored: size, size, compression: Compression::None, crc: None, cut: false }
 }
 
 /// Opcode and length of the record at `at`; `None` at the end of the file.
@@ -177,8 +175,9 @@ impl Records for McapRecords {
                         return Err(wrong());
                     };
                     let Some(&topic) = state.topics.get(&u32::from(header.channel_id)) else {
-                        let problem = format!("a message of unknown channel {}", header.channel_id);
-                        return Err(DataError::new(problem).byte(at));
+                        state.orphans += 1;
+                        at = end;
+                        continue;
                     };
                     let recorded = Stamp::from_nanos(i64::try_from(header.log_time).unwrap_or(i64::MAX));
                     scan.topics[topic].note(recorded, 1);

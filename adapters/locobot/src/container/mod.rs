@@ -143,7 +143,6 @@ impl Scan {
     }
 
     fn damaged(&mut self, error: &DataError) {
-        tracing::warn!("{error}");
         self.damage.push(error.to_string());
     }
 }
@@ -195,7 +194,7 @@ impl Recording {
 
     /// Walks all files.
     ///
-    /// Damage inside is passed over with a warning and kept in [`Scan::damage`].
+    /// Damage inside is passed over and kept in [`Scan::damage`].
     ///
     /// # Errors
     /// [`DataError`] if a file cannot be read at all.

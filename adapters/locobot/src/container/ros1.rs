@@ -45,6 +45,7 @@ pub(super) fn open(path: &Path) -> DataResult<Ros1> {
     let (mut blocks, mut damage) = (Vec::new(), Vec::new());
     let mut at = VERSION.len() as u64;
     let mut unindexed = false;
+    let mut described: Option<(u64, u64)> = None;
     while at < file.len() {
         let record = match record(&mut source, at) {
             Ok(record) => record,
@@ -56,6 +57,8 @@ pub(super) fn open(path: &Path) -> DataResult<Ros1> {
         let end = record.data_at.saturating_add(u64::from(record.data_len));
         let cut = end > file.len();
         match record.op {
+            // The index repeats the connections, which helps where the chunk with the first mention is damaged.
+            OP_CONNECTION if !cut => described = Some((described.map_or(at, |d| d.0), end)),
             OP_BAG => unindexed = record.index_pos == Some(0),
             OP_CHUNK => {
                 let compression = Compression::from_name(&record.text).map_err(|e| e.at(path).byte(at))?;
@@ -90,6 +93,9 @@ pub(super) fn open(path: &Path) -> DataResult<Ros1> {
             Some(cause) => error.because(cause),
             None => error,
         });
+    }
+    if let Some((from, to)) = described {
+        blocks.insert(0, Block::plain(from, to));
     }
     Ok(Ros1 { path: path.to_path_buf(), file, blocks, damage })
 }
@@ -138,9 +144,9 @@ impl Records for BagRecords {
                 }
                 OP_MESSAGE => {
                     let Some(&topic) = state.topics.get(&conn) else {
-                        return Err(
-                            DataError::new(format!("a message of unknown connection {conn}")).byte(at)
-                        );
+                        state.orphans += 1;
+                        at = end;
+                        continue;
                     };
                     let recorded = record.time.unwrap_or_default();
                     scan.topics[topic].note(recorded, 1);

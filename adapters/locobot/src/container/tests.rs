@@ -151,6 +151,13 @@ fn a_damaged_chunk_is_left_out_and_named() {
     let seen = read_bytes(&bytes).unwrap();
     assert!(seen.all.seen.len() < full && seen.all.seen.len() >= full - 20, "{}", seen.all.seen.len());
     assert!(seen.damage().contains("check sum") && seen.damage().contains("byte "), "{}", seen.damage());
+    // The first chunk, which has the first mention of all topics: the index has the second.
+    let mut bytes = mcap(&messages);
+    let needle = &messages[0].bytes[1];
+    let at = bytes.windows(needle.len()).position(|w| w == needle).unwrap();
+    bytes[at + 30] ^= 1;
+    let seen = read_bytes(&bytes).unwrap();
+    assert!(seen.all.seen.len() > full - 10, "{} of {full}: {}", seen.all.seen.len(), seen.damage());
     // A bit of compressed data.
     let mut bytes = bag(&messages, "bz2", 10, true);
     let middle = bytes.len() / 2;
