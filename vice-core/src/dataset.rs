@@ -279,10 +279,9 @@ impl DepthImage {
                 "a {width}x{height} depth image has {expected} values, got {got}"
             )));
         }
+        // Stored in any case, so that several are done at once.
         for z in &mut z_m {
-            if !(z.is_finite() && *z > 0.0) {
-                *z = f32::NAN;
-            }
+            *z = if z.is_finite() && *z > 0.0 { *z } else { f32::NAN };
         }
         Ok(Self { stamp, width, height, z_m })
     }
