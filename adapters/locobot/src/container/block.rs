@@ -18,6 +18,8 @@ const TRUSTED_BYTES: u64 = 64 << 20;
 const CACHED_BLOCKS: usize = 4;
 /// Bytes kept, beside the newest block.
 const CACHED_BYTES: usize = 64 << 20;
+/// Bytes beyond which a block is not decompressed before it is asked for.
+const READ_AHEAD_BYTES: u64 = 16 << 20;
 /// Bytes read at once where records are small.
 const WINDOW_BYTES: usize = 64 << 10;
 
@@ -204,11 +206,11 @@ pub(super) struct BlockFile {
 }
 
 impl BlockFile {
-    pub(super) fn open(path: &Path) -> DataResult<Self> {
+    pub(super) fn open(path: &Path) -> DataResult<Arc<Self>> {
         let failed = |e: std::io::Error| DataError::new("cannot be read").at(path).because(e);
         let file = File::open(path).map_err(failed)?;
         let len = file.metadata().map_err(failed)?.len();
-        Ok(Self { file: Mutex::new(file), len, cache: Mutex::default() })
+        Ok(Arc::new(Self { file: Mutex::new(file), len, cache: Mutex::default() }))
     }
 
     pub(super) fn len(&self) -> u64 {
@@ -262,47 +264,66 @@ impl BlockFile {
         (bytes, problem)
     }
 
-    fn cached(&self, index: u32, block: &Block) -> DataResult<Arc<Vec<u8>>> {
-        let entry = {
-            let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
-            match cache.iter().position(|(i, _)| *i == index) {
-                Some(at) => {
-                    let hit = cache.remove(at);
-                    cache.push(hit);
-                }
-                None => {
-                    let size = |entry: &Arc<OnceLock<Decompressed>>| match entry.get() {
-                        Some(Ok(bytes)) => bytes.len(),
-                        _ => 0,
-                    };
-                    while cache.len() >= CACHED_BLOCKS
-                        || cache.iter().map(|(_, entry)| size(entry)).sum::<usize>() > CACHED_BYTES
-                    {
-                        cache.remove(0);
-                    }
-                    cache.push((index, Arc::default()));
-                }
-            }
-            cache.last().map(|(_, entry)| Arc::clone(entry)).unwrap_or_default()
+    /// The entry of a block in the cache, and whether it is new there.
+    fn entry(&self, index: u32) -> (Arc<OnceLock<Decompressed>>, bool) {
+        let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        let hit = cache.iter().position(|(i, _)| *i == index).map(|at| cache.remove(at));
+        let is_new = hit.is_none();
+        let (_, entry) = hit.unwrap_or_else(|| (index, Arc::default()));
+        let size = |entry: &Arc<OnceLock<Decompressed>>| match entry.get() {
+            Some(Ok(bytes)) => bytes.len(),
+            _ => 0,
         };
+        while cache.len() >= CACHED_BLOCKS
+            || cache.iter().map(|(_, entry)| size(entry)).sum::<usize>() > CACHED_BYTES
+        {
+            cache.remove(0);
+        }
+        cache.push((index, Arc::clone(&entry)));
+        (entry, is_new)
+    }
+
+    fn load_into(&self, entry: &OnceLock<Decompressed>, block: &Block) -> Decompressed {
         // Decompressed outside the lock of the cache, and once where several threads want the same block.
-        let bytes = entry.get_or_init(|| {
+        let loaded = entry.get_or_init(|| {
             let (bytes, problem) = self.load(block);
             match problem {
                 Some(problem) if !block.cut => Err(problem),
                 _ => Ok(Arc::new(bytes)),
             }
         });
-        bytes.clone().map_err(|problem| DataError::new(format!("the chunk {problem}")).byte(block.offset))
+        loaded.clone()
+    }
+
+    fn holds(&self, index: u32) -> bool {
+        let cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        cache.iter().any(|(i, _)| *i == index)
+    }
+
+    fn cached(self: &Arc<Self>, blocks: &[Block], index: u32) -> DataResult<Arc<Vec<u8>>> {
+        let block = &blocks[index as usize];
+        let stepping = index.checked_sub(1).is_some_and(|before| self.holds(before));
+        let (entry, _) = self.entry(index);
+        // Who steps forward will want the next block: it is decompressed while this one is being used.
+        let next = blocks.get(index as usize + 1).filter(|next| stepping && !next.is_plain());
+        if let Some(&next) = next.filter(|next| next.size <= READ_AHEAD_BYTES) {
+            let (ahead, is_new) = self.entry(index + 1);
+            if is_new {
+                let file = Arc::clone(self);
+                rayon::spawn(move || drop(file.load_into(&ahead, &next)));
+            }
+        }
+        self.load_into(&entry, block)
+            .map_err(|problem| DataError::new(format!("the chunk {problem}")).byte(block.offset))
     }
 
     /// Reads a message.
-    pub(super) fn read(&self, blocks: &[Block], at: &Locator) -> DataResult<Payload> {
+    pub(super) fn read(self: &Arc<Self>, blocks: &[Block], at: &Locator) -> DataResult<Payload> {
         let block = &blocks[at.block as usize];
         if block.is_plain() {
             return Ok(Payload::Alone(self.read_vec(block.offset + at.at, u64::from(at.bytes))?));
         }
-        let bytes = self.cached(at.block, block)?;
+        let bytes = self.cached(blocks, at.block)?;
         let (from, to) = (at.at as usize, at.at as usize + at.bytes as usize);
         if to > bytes.len() {
             return Err(DataError::new("the file has changed since it was opened").byte(block.offset));

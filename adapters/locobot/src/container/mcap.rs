@@ -2,6 +2,7 @@
 //! is found here, since its readers want either the whole file in memory or the index at its end.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use mcap::records::{Record, op};
 use vice_core::error::{DataError, DataResult};
@@ -24,7 +25,7 @@ const MAX_DESCRIPTION_BYTES: u64 = 16 << 20;
 /// A file and where its chunks are.
 pub(super) struct Mcap {
     path: PathBuf,
-    file: BlockFile,
+    file: Arc<BlockFile>,
     blocks: Vec<Block>,
     damage: Option<DataError>,
 }

@@ -4,6 +4,7 @@
 //! trusts the sizes in the headers, and refuses a bag without index, which is what a crashed recorder leaves behind.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use vice_core::error::{DataError, DataResult};
 use vice_core::time::Stamp;
@@ -27,7 +28,7 @@ const OP_CONNECTION: u8 = 0x07;
 /// A bag and where its chunks are.
 pub(super) struct Ros1 {
     path: PathBuf,
-    file: BlockFile,
+    file: Arc<BlockFile>,
     blocks: Vec<Block>,
     damage: Vec<DataError>,
 }

@@ -99,6 +99,26 @@ fn heads_are_short_and_cost_no_more() {
 }
 
 #[test]
+fn stepping_forward_and_jumping_about_read_the_same() {
+    let messages = run();
+    let seen = read_bytes(&bag(&messages, "lz4", 3, true)).unwrap();
+    let n = messages.len();
+    let orders: [Vec<usize>; 3] =
+        [(0..n).collect(), (0..n).rev().collect(), (0..n).map(|i| i * 17 % n).collect()];
+    std::thread::scope(|scope| {
+        for order in orders.iter().cycle().take(6) {
+            let seen = &seen;
+            scope.spawn(move || {
+                for i in order {
+                    let (_, bytes, locator) = &seen.all.seen[*i];
+                    assert_eq!(seen.recording.read(locator).unwrap().bytes(), bytes);
+                }
+            });
+        }
+    });
+}
+
+#[test]
 fn a_cut_recording_reads_as_far_as_it_goes_and_says_how_far() {
     let messages = run();
     let full = messages.len();
