@@ -40,6 +40,11 @@ pub(crate) enum Command {
     Info(commands::info::Args),
     /// List the data set formats.
     Formats,
+    /// Depth images of a frame from each source; `compare` for labelled key points.
+    Depth(Box<commands::depth::Args>),
+    /// The floor plane.
+    #[command(subcommand)]
+    Floor(commands::floor::Command),
     /// Write a rendered flight with exact labels and flawed estimates, in the EuRoC layout.
     Synth(commands::synth::Args),
     /// Work with labels files.

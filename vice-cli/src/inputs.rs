@@ -4,7 +4,7 @@ mod depth;
 mod open;
 mod streams;
 
-pub(crate) use depth::depth_sources;
+pub(crate) use depth::{AnchorArgs, DepthArgs, Scene};
 pub(crate) use open::{DatasetArgs, split_list};
 pub(crate) use streams::{StreamArgs, load_streams};
 

@@ -16,7 +16,10 @@ use arguments::{Cli, Command};
 use terminal::{Outcome, UsageError};
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return terminal::wrong_usage(&error),
+    };
     let verbosity = terminal::Verbosity::new(cli.quiet, cli.verbose);
     terminal::show_warnings(verbosity);
     let outcome = match &cli.command {
@@ -25,6 +28,8 @@ fn main() -> ExitCode {
         Command::Trajectory(args) => commands::trajectory::run(args),
         Command::Info(args) => commands::info::run(args),
         Command::Formats => commands::formats::run(),
+        Command::Depth(args) => commands::depth::run(args, verbosity),
+        Command::Floor(command) => commands::floor::run(command, verbosity),
         Command::Synth(args) => commands::synth::run(args, verbosity),
         Command::Labels(args) => commands::labels::run(args),
         Command::Convert(args) => commands::convert::run(args),

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::io::{IsTerminal, Write};
+use std::process::ExitCode;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use tracing_subscriber::fmt::format::Writer;
@@ -105,6 +106,28 @@ where
         context.field_format().format_fields(Writer::new(&mut text), event)?;
         writeln!(writer, "{name}: {}", printable(&text))
     }
+}
+
+/// Help and version as they are; what is wrong with the command line on one line, as every other error.
+pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
+    use clap::error::ErrorKind;
+    if matches!(
+        error.kind(),
+        ErrorKind::DisplayHelp
+            | ErrorKind::DisplayVersion
+            | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
+    ) {
+        // Nothing is left to tell if even this cannot be printed.
+        let _ = error.print();
+        return ExitCode::from(u8::from(error.use_stderr()) * 2);
+    }
+    let text = error.to_string();
+    // The usage and the pointer to help come after what is wrong and its tips.
+    let what = text.split("\n\nUsage:").next().unwrap_or(&text);
+    let what = what.split("\n\nFor more information").next().unwrap_or(what);
+    let words: Vec<&str> = what.split_whitespace().collect();
+    let _ = writeln!(std::io::stderr(), "{} (see --help)", printable(&words.join(" ")));
+    ExitCode::from(2)
 }
 
 /// Prints an error and its causes on one line.

@@ -3,17 +3,12 @@
 use std::path::PathBuf;
 
 use anyhow::Context;
-use vice_core::dataset::{Floor, Plane};
 use vice_core::depth::DepthSource;
 use vice_core::evaluate::{EvaluateError, Evaluation, Selection, evaluate};
-use vice_core::frames::World;
 use vice_core::metrics::align::Alignment;
 use vice_core::result::{ResultDocument, Settings};
-use vice_files::calibration::CalibrationFile;
 
-use crate::inputs::{
-    DatasetArgs, LabelArgs, StreamArgs, depth_sources, load_streams, numbers, split_list, write_text,
-};
+use crate::inputs::{DatasetArgs, DepthArgs, LabelArgs, StreamArgs, load_streams, write_text};
 use crate::report;
 use crate::terminal::{self, Outcome, Verbosity, usage};
 
@@ -32,30 +27,15 @@ pub(crate) struct Args {
     labels: LabelArgs,
     #[command(flatten)]
     streams: StreamArgs,
+    /// Depth sources: floor, zmap, zcam, mesh [default: floor].
+    #[arg(long, value_name = "SOURCE,...", help_heading = "Depth")]
+    depth: Vec<String>,
     #[command(flatten)]
-    depth: DepthArgs,
+    depth_options: DepthArgs,
     #[command(flatten)]
     scoring: ScoringArgs,
     #[command(flatten)]
     output: OutputArgs,
-}
-
-/// Where depth at key frames comes from.
-#[derive(Debug, clap::Args)]
-#[command(next_help_heading = "Depth")]
-pub(crate) struct DepthArgs {
-    /// Depth sources: floor, zmap, zcam, mesh [default: floor].
-    #[arg(long, value_name = "SOURCE,...")]
-    pub(crate) depth: Vec<String>,
-    /// Floor plane n·p + d = 0 in the world, instead of the data set's.
-    #[arg(long, value_name = "NX,NY,NZ,D", allow_hyphen_values = true, value_parser = numbers::<4>)]
-    pub(crate) floor_plane: Option<[f64; 4]>,
-    /// Whether the Z-map leaves out cloud points that are hidden; off reproduces the paper.
-    #[arg(long, value_name = "on|off", default_value = "on", value_parser = on_off)]
-    pub(crate) zmap_occlusion: bool,
-    /// Calibration that overrides the data set's: TOML, or a Kalibr camchain.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) calibration: Option<PathBuf>,
 }
 
 /// How it is scored.
@@ -89,14 +69,6 @@ struct OutputArgs {
     /// The table as LaTeX.
     #[arg(long, value_name = "FILE")]
     latex: Option<PathBuf>,
-}
-
-fn on_off(text: &str) -> Result<bool, String> {
-    match text {
-        "on" => Ok(true),
-        "off" => Ok(false),
-        _ => Err("expected on or off".to_string()),
-    }
 }
 
 fn percent(text: &str) -> Result<f64, String> {
@@ -145,7 +117,8 @@ fn to_json(document: &ResultDocument) -> anyhow::Result<String> {
 }
 
 fn document(args: &Args, verbosity: Verbosity) -> anyhow::Result<ResultDocument> {
-    let calibration = args.depth.calibration.as_ref().map(CalibrationFile::read).transpose()?;
+    let calibration = args.depth_options.calibration()?;
+    let floor = args.depth_options.floor()?;
     let dataset = args.dataset.open()?;
     let used = args.dataset.used_camera(dataset.as_ref(), calibration.as_ref())?;
     let labels = args.labels.read(&used.frames)?;
@@ -161,15 +134,7 @@ fn document(args: &Args, verbosity: Verbosity) -> anyhow::Result<ResultDocument>
         return Err(usage(EvaluateError::SubsetTooLarge { asked: *asked, points }.to_string()));
     }
     let streams = load_streams(&args.streams, dataset.as_ref(), &used, &selection, calibration.as_ref())?;
-    let floor = match args.depth.floor_plane {
-        Some([nx, ny, nz, d]) => {
-            let plane =
-                Plane::<World>::new([nx, ny, nz], d).map_err(|e| usage(format!("--floor-plane: {e}")))?;
-            Some(Floor::World(plane))
-        }
-        None => None,
-    };
-    let sources = depth_sources(&args.depth, &dataset, &used.name)?;
+    let sources = args.depth_options.sources("--depth", &args.depth, &dataset, &used.name)?;
     let sources: Vec<&dyn DepthSource> = sources.iter().map(AsRef::as_ref).collect();
     let settings = Settings {
         labels: args.labels.labels.display().to_string(),
@@ -181,11 +146,11 @@ fn document(args: &Args, verbosity: Verbosity) -> anyhow::Result<ResultDocument>
         time_offset_s: streams.time_offset.as_secs_f64(),
         align: args.scoring.align.name().to_string(),
         anchor: streams.list[streams.anchor].name.clone(),
-        calibration: args.depth.calibration.as_ref().map(|p| p.display().to_string()),
-        floor_plane: args.depth.floor_plane,
-        zmap_occlusion: args.depth.zmap_occlusion,
+        calibration: args.depth_options.calibration.as_ref().map(|p| p.display().to_string()),
+        floor_plane: args.depth_options.floor_plane,
+        zmap_occlusion: args.depth_options.zmap_occlusion,
         estimate_frame: args.streams.estimate_frame.clone(),
-        other: args.dataset.settings.iter().map(|(k, v)| (format!("set {k}"), v.clone())).collect(),
+        other: other_settings(args),
     };
     let evaluation = Evaluation {
         dataset: dataset.as_ref(),
@@ -213,8 +178,15 @@ fn document(args: &Args, verbosity: Verbosity) -> anyhow::Result<ResultDocument>
     Ok(document)
 }
 
-/// The depth sources that are asked for, `floor` where none is.
-pub(crate) fn depth_names(args: &DepthArgs) -> Vec<String> {
-    let names = split_list(&args.depth);
-    if names.is_empty() { vec!["floor".to_string()] } else { names }
+/// Options that have no field of their own in the document.
+fn other_settings(args: &Args) -> std::collections::BTreeMap<String, String> {
+    let mut other: std::collections::BTreeMap<String, String> =
+        args.dataset.settings.iter().map(|(key, value)| (format!("set {key}"), value.clone())).collect();
+    if let Some(voxel_m) = args.depth_options.cloud_voxel {
+        other.insert("cloud-voxel".to_string(), voxel_m.to_string());
+    }
+    if let Some([near, far]) = args.depth_options.zcam_range {
+        other.insert("zcam-range".to_string(), format!("{near},{far}"));
+    }
+    other
 }

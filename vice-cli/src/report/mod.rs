@@ -4,6 +4,7 @@ pub(crate) mod csv;
 pub(crate) mod depth_picture;
 pub(crate) mod font;
 pub(crate) mod latex;
+pub(crate) mod npy;
 pub(crate) mod overlay;
 pub(crate) mod rows;
 pub(crate) mod table;

@@ -9,8 +9,6 @@ pub(crate) type Colour = [u8; 3];
 
 /// The paper's colours, shifted so that people who are colour-blind can tell them apart (Okabe and Ito).
 pub(crate) const LABEL_BLUE: Colour = [0, 114, 178];
-/// The reference.
-pub(crate) const REFERENCE_RED: Colour = [213, 94, 0];
 /// The on-board estimate.
 pub(crate) const ESTIMATE_GREEN: Colour = [0, 158, 115];
 /// A second estimate.
