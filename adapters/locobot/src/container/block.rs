@@ -77,47 +77,42 @@ impl Block {
     }
 }
 
-/// Decompresses; gives what came out and, where that is not everything, why.
+/// Decompresses into `out`, whose memory is used again; gives why where that is not everything.
 pub(super) fn decompress(
     compression: Compression,
     stored: Vec<u8>,
     size: u64,
     salvage: bool,
-) -> (Vec<u8>, Option<String>) {
+    out: &mut Vec<u8>,
+) -> Option<String> {
+    out.clear();
     if size > MAX_BLOCK_BYTES {
-        return (Vec::new(), Some(format!("claims {size} bytes, more than {MAX_BLOCK_BYTES} is not read")));
+        return Some(format!("claims {size} bytes, more than {MAX_BLOCK_BYTES} is not read"));
     }
-    let capacity = size.min(TRUSTED_BYTES) as usize;
-    let mut out = Vec::new();
+    if compression != Compression::None {
+        out.reserve_exact(size.min(TRUSTED_BYTES) as usize);
+    }
     let done = match compression {
         Compression::None => {
-            out = stored;
+            *out = stored;
             Ok(0)
         }
         Compression::Zstd if !salvage && size <= TRUSTED_BYTES => {
-            out.reserve_exact(capacity);
-            zstd::bulk::Decompressor::new().and_then(|mut d| d.decompress_to_buffer(&stored, &mut out))
+            // The buffer may be larger than this block: what does not fit its header is refused below.
+            zstd::bulk::Decompressor::new().and_then(|mut d| d.decompress_to_buffer(&stored, out))
         }
-        Compression::Zstd => {
-            out.reserve_exact(capacity);
-            zstd::stream::read::Decoder::new(stored.as_slice())
-                .and_then(|d| d.take(size + 1).read_to_end(&mut out))
-        }
+        Compression::Zstd => zstd::stream::read::Decoder::new(stored.as_slice())
+            .and_then(|d| d.take(size + 1).read_to_end(out)),
         Compression::Lz4 => {
-            out.reserve_exact(capacity);
-            lz4::Decoder::new(stored.as_slice()).and_then(|d| d.take(size + 1).read_to_end(&mut out))
+            lz4::Decoder::new(stored.as_slice()).and_then(|d| d.take(size + 1).read_to_end(out))
         }
-        Compression::Bz2 => {
-            out.reserve_exact(capacity);
-            bzip2::read::BzDecoder::new(stored.as_slice()).take(size + 1).read_to_end(&mut out)
-        }
+        Compression::Bz2 => bzip2::read::BzDecoder::new(stored.as_slice()).take(size + 1).read_to_end(out),
     };
-    let problem = match done {
+    match done {
         Err(e) => Some(format!("cannot be decompressed: {e}")),
         Ok(_) if out.len() as u64 != size => Some(format!("has {} bytes, its header says {size}", out.len())),
         Ok(_) => None,
-    };
-    (out, problem)
+    }
 }
 
 /// Random access to bytes of a file or of memory.
@@ -203,6 +198,7 @@ pub(super) struct BlockFile {
     file: Mutex<File>,
     len: u64,
     cache: Mutex<Vec<(u32, Arc<OnceLock<Decompressed>>)>>,
+    spare: Mutex<Option<Vec<u8>>>,
 }
 
 impl BlockFile {
@@ -210,7 +206,7 @@ impl BlockFile {
         let failed = |e: std::io::Error| DataError::new("cannot be read").at(path).because(e);
         let file = File::open(path).map_err(failed)?;
         let len = file.metadata().map_err(failed)?.len();
-        Ok(Arc::new(Self { file: Mutex::new(file), len, cache: Mutex::default() }))
+        Ok(Arc::new(Self { file: Mutex::new(file), len, cache: Mutex::default(), spare: Mutex::default() }))
     }
 
     pub(super) fn len(&self) -> u64 {
@@ -243,25 +239,27 @@ impl BlockFile {
         Ok(bytes)
     }
 
-    fn load(&self, block: &Block) -> (Vec<u8>, Option<String>) {
+    /// Reads and decompresses a block into `out`; gives why where that is not everything.
+    fn load(&self, block: &Block, out: &mut Vec<u8>) -> Option<String> {
+        out.clear();
         if block.stored > MAX_BLOCK_BYTES {
-            return (Vec::new(), Some(format!("has {} bytes, too many to be read", block.stored)));
+            return Some(format!("has {} bytes, too many to be read", block.stored));
         }
         let stored = match self.read_vec(block.offset, block.stored) {
             Ok(stored) => stored,
-            Err(e) => return (Vec::new(), Some(e.to_string())),
+            Err(e) => return Some(e.to_string()),
         };
-        let (bytes, problem) = decompress(block.compression, stored, block.size, block.cut);
+        let problem = decompress(block.compression, stored, block.size, block.cut, out);
         if problem.is_none()
             && let Some(crc) = block.crc
         {
-            let found = crc32fast::hash(&bytes);
+            let found = crc32fast::hash(out);
             if found != crc {
-                let problem = format!("has the check sum {found:08x}, its header says {crc:08x}");
-                return (Vec::new(), Some(problem));
+                out.clear();
+                return Some(format!("has the check sum {found:08x}, its header says {crc:08x}"));
             }
         }
-        (bytes, problem)
+        problem
     }
 
     /// The entry of a block in the cache, and whether it is new there.
@@ -277,7 +275,12 @@ impl BlockFile {
         while cache.len() >= CACHED_BLOCKS
             || cache.iter().map(|(_, entry)| size(entry)).sum::<usize>() > CACHED_BYTES
         {
-            cache.remove(0);
+            let (_, oldest) = cache.remove(0);
+            // The memory of a block that nobody uses any more serves the next one.
+            let bytes = Arc::into_inner(oldest).and_then(OnceLock::into_inner);
+            if let Some(bytes) = bytes.and_then(Result::ok).and_then(Arc::into_inner) {
+                *self.spare.lock().unwrap_or_else(PoisonError::into_inner) = Some(bytes);
+            }
         }
         cache.push((index, Arc::clone(&entry)));
         (entry, is_new)
@@ -286,8 +289,9 @@ impl BlockFile {
     fn load_into(&self, entry: &OnceLock<Decompressed>, block: &Block) -> Decompressed {
         // Decompressed outside the lock of the cache, and once where several threads want the same block.
         let loaded = entry.get_or_init(|| {
-            let (bytes, problem) = self.load(block);
-            match problem {
+            let spare = self.spare.lock().unwrap_or_else(PoisonError::into_inner).take();
+            let mut bytes = spare.unwrap_or_default();
+            match self.load(block, &mut bytes) {
                 Some(problem) if !block.cut => Err(problem),
                 _ => Ok(Arc::new(bytes)),
             }
@@ -342,6 +346,7 @@ impl BlockFile {
         visitor: &mut dyn Visitor,
     ) {
         let mut state = State::default();
+        let mut buffers = vec![Vec::new(); rayon::current_num_threads().min(16)];
         let mut at = 0;
         while at < blocks.len() {
             if blocks[at].is_plain() {
@@ -355,9 +360,10 @@ impl BlockFile {
                 continue;
             }
             let batch = blocks[at..].iter().take_while(|b| !b.is_plain());
-            let batch: Vec<&Block> = batch.take(rayon::current_num_threads().min(16)).collect();
-            let loaded: Vec<_> = batch.par_iter().map(|block| self.load(block)).collect();
-            for (block, (bytes, problem)) in batch.into_iter().zip(loaded) {
+            let batch: Vec<&Block> = batch.take(buffers.len()).collect();
+            let each = batch.par_iter().zip(&mut buffers);
+            let problems: Vec<_> = each.map(|(block, buffer)| self.load(block, buffer)).collect();
+            for ((block, bytes), problem) in batch.into_iter().zip(&buffers).zip(problems) {
                 if let Some(problem) = &problem {
                     let kept = if block.cut { "read as far as it goes" } else { "its messages are left out" };
                     let problem = format!("the chunk {problem}: {kept}");
@@ -365,7 +371,7 @@ impl BlockFile {
                 }
                 if problem.is_none() || block.cut {
                     let place = (file, at as u32);
-                    let walked = records.walk(&mut Memory(&bytes), place, &mut state, scan, visitor);
+                    let walked = records.walk(&mut Memory(bytes), place, &mut state, scan, visitor);
                     if let Err(e) = walked
                         && !block.cut
                     {
