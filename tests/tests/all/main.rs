@@ -5,6 +5,7 @@ mod blackbird_oracle;
 mod camera_oracle;
 mod euroc_oracle;
 mod evaluate_oracle;
+mod locobot_oracle;
 mod depth_oracle;
 mod trajectory_oracle;
 mod synthetic;
