@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
+use vice_core::dataset::DepthImage;
 use vice_core::depth::DepthMiss;
 use vice_depth::{DepthMap, depth_image};
 use vice_files::atomic::{self, Overwrite};
@@ -22,10 +23,40 @@ use crate::terminal::{self, Outcome, Verbosity, usage};
     vice depth V1_01_easy --at 1403715280562142976 --source floor,zmap --out depth_out\n  \
     vice depth compare V1_01_easy --labels floor.csv --source floor,zmap")]
 pub(crate) struct Args {
+    // Before the subcommand, which is taken out of the matches when it is read.
+    #[command(flatten)]
+    images: WithoutCommand,
     #[command(subcommand)]
     command: Option<Command>,
-    #[command(flatten)]
-    images: Option<ImageArgs>,
+}
+
+/// The arguments of the images themselves, which a subcommand takes the place of. An `Option` would do, but clap finds
+/// one empty that has flattened arguments of its own.
+#[derive(Debug)]
+struct WithoutCommand(Option<ImageArgs>);
+
+impl clap::FromArgMatches for WithoutCommand {
+    fn from_arg_matches(matches: &clap::ArgMatches) -> Result<Self, clap::Error> {
+        match matches.subcommand_name() {
+            Some(_) => Ok(Self(None)),
+            None => ImageArgs::from_arg_matches(matches).map(|images| Self(Some(images))),
+        }
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &clap::ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl clap::Args for WithoutCommand {
+    fn augment_args(command: clap::Command) -> clap::Command {
+        ImageArgs::augment_args(command)
+    }
+
+    fn augment_args_for_update(command: clap::Command) -> clap::Command {
+        ImageArgs::augment_args_for_update(command)
+    }
 }
 
 /// What else can be done with depth.
@@ -55,7 +86,7 @@ struct ImageArgs {
 }
 
 pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
-    match (&args.command, &args.images) {
+    match (&args.command, &args.images.0) {
         (Some(Command::Compare(compare)), _) => depth_compare::run(compare),
         (None, Some(images)) => write_images(images, verbosity),
         (None, None) => Err(usage("name a data set, or `vice depth compare`")),
@@ -81,7 +112,7 @@ fn write_images(args: &ImageArgs, verbosity: Verbosity) -> anyhow::Result<Outcom
         }
         let image = map.to_image(&keyframe)?;
         grid.push(summary(source.name(), &map));
-        files.push((format!("{}.png", source.name()), encode_depth_png(&image, 0.001)?));
+        files.push((format!("{}.png", source.name()), millimetres(source.name(), &image)?));
         files.push((
             format!("{}.npy", source.name()),
             npy::encode_f32(image.height(), image.width(), image.z_m()),
@@ -114,6 +145,20 @@ fn write_images(args: &ImageArgs, verbosity: Verbosity) -> anyhow::Result<Outcom
     text.push_str(&format!("wrote {} to {}\n", names.join(", "), args.out.display()));
     terminal::print(&text)?;
     Ok(Outcome::Done)
+}
+
+/// A 16-bit PNG in millimetres, which ends at 65.535 m: what is further has no depth there, and is said.
+fn millimetres(name: &str, image: &DepthImage) -> anyhow::Result<Vec<u8>> {
+    const FURTHEST_M: f32 = 65.535;
+    let beyond = image.z_m().iter().filter(|z| **z > FURTHEST_M).count();
+    if beyond == 0 {
+        return Ok(encode_depth_png(image, 0.001)?);
+    }
+    tracing::warn!(
+        "{beyond} pixels of {name} are further than {FURTHEST_M} m and are left out of its 16-bit PNG; the .npy has them"
+    );
+    let z_m = image.z_m().iter().map(|z| if *z > FURTHEST_M { f32::NAN } else { *z }).collect();
+    Ok(encode_depth_png(&DepthImage::new(image.stamp, image.width(), image.height(), z_m)?, 0.001)?)
 }
 
 fn write(folder: &Path, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
