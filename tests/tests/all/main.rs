@@ -1,6 +1,7 @@
 //! Everything that is tested through the program or against the oracles, in one test program: it links once.
 #![allow(missing_docs)]
 
+mod bad_input;
 mod blackbird_oracle;
 mod camera_oracle;
 mod euroc_oracle;
