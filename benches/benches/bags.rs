@@ -24,7 +24,9 @@ const RECORDINGS: [&str; 5] = [
     "locobot_ros2_mcap/locobot_ros2.mcap",
     "locobot_ros2_db3/locobot_ros2_db3.db3",
 ];
+/// Rounds and seconds of a recording at least: the best of many survives a machine that others use too.
 const ROUNDS: usize = 15;
+const SECONDS: f64 = 8.0;
 
 /// Decodes all small messages, and decompresses all chunks and nothing else; prints both times in seconds.
 const PYTHON: &str = r#"
@@ -77,8 +79,8 @@ def bare():
     for how, chunk in found:
         how(chunk)
     return time.perf_counter() - t
-best, n = min(small() for _ in range(7))
-print(best, min(bare() for _ in range(7)), n)
+rounds = [(small(), bare()) for _ in range(12)]
+print(min(s[0] for s, _ in rounds), min(b for _, b in rounds), rounds[0][0][1])
 "#;
 
 /// A chunk and the decompressor it needs.
@@ -178,7 +180,8 @@ fn main() {
         let camera = data.cameras().remove(0);
         let n = data.frames(&camera).unwrap().len();
         let mut best = [f64::INFINITY; 4];
-        for _ in 0..ROUNDS {
+        let start = Instant::now();
+        for _ in (0..).take_while(|round| *round < ROUNDS || start.elapsed().as_secs_f64() < SECONDS) {
             let times = [
                 seconds(|| chunks.iter().for_each(|c| c.decompress(black_box(&mut out)))),
                 seconds(|| drop(black_box(open(&path)))),
@@ -206,13 +209,14 @@ fn main() {
         );
         if let Some([theirs, their_bare, messages]) = python(&path) {
             let (theirs, their_bare) = (theirs * 1e3, their_bare * 1e3);
-            // Where decompression takes nearly all of the time the difference is noise: no more than this is claimed.
-            let ours = (open_s - bare).max(open_s * 0.01);
             println!(
-                "  rosbags: {messages} small messages in {theirs:.3} ms, {their_bare:.3} ms of it bare decompression: \
-                 {:.1} times as long",
-                (theirs - their_bare) / ours
+                "  rosbags: {messages} small messages {theirs:9.3} ms, {their_bare:.3} ms of it bare decompression"
             );
+            let (theirs, ours) = (theirs - their_bare, open_s - bare);
+            // Where decompression is nearly all of the time, the difference of two such times is noise.
+            if theirs > 0.1 * their_bare && ours > 0.01 * bare {
+                println!("  rosbags takes {:.1} times as long, decompression taken off both", theirs / ours);
+            }
         }
     }
 }
