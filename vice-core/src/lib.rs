@@ -21,5 +21,6 @@ pub mod metrics;
 pub mod registry;
 pub mod result;
 pub mod time;
+pub mod time_unit;
 pub mod track;
 pub mod trajectory;

@@ -211,19 +211,6 @@ impl fmt::Display for Span {
     }
 }
 
-/// Two ranges of stamps that should be of one clock but lie a power of a thousand apart: which of them has another
-/// unit, in words that follow "first range, second range" in a message.
-pub fn suspect_unit(former: (Stamp, Stamp), latter: (Stamp, Stamp)) -> Option<String> {
-    let size = |(a, b): (Stamp, Stamp)| (a.0.unsigned_abs().max(b.0.unsigned_abs())) as f64;
-    let (former, latter) = (size(former), size(latter));
-    let (who, ratio) =
-        if former < latter { ("former", latter / former) } else { ("latter", former / latter) };
-    let units = [(1e3, "microseconds"), (1e6, "milliseconds"), (1e9, "seconds")];
-    // Stamps of one epoch agree to a few per cent; a factor of two leaves room for clocks that started at boot.
-    let (_, unit) = units.into_iter().find(|(factor, _)| (0.5..2.0).contains(&(ratio / factor)))?;
-    Some(format!("the {who} look like {unit} where nanoseconds are expected"))
-}
-
 fn seconds_text(nanos: i64) -> String {
     let sign = if nanos < 0 { "-" } else { "" };
     let magnitude = nanos.unsigned_abs();
@@ -308,25 +295,6 @@ mod tests {
         assert!(matches!(Stamp::parse_seconds("1e300"), Err(TimeError::OutOfRange(_))));
         assert!(Span::from_secs_f64(f64::NAN).is_err());
         assert!(Span::from_secs_f64(1e300).is_err());
-    }
-
-    #[test]
-    fn a_mixed_up_unit_is_suspected() {
-        let ns = |a: i64, b: i64| (Stamp::from_nanos(a), Stamp::from_nanos(b));
-        let flight = ns(1403715273262142976, 1403715418762142976);
-        let said = |a| suspect_unit(a, flight).unwrap_or_default();
-        assert_eq!(
-            said(ns(1403715273, 1403715418)),
-            "the former look like seconds where nanoseconds are expected"
-        );
-        assert!(said(ns(1403715273262, 1403715418762)).contains("milliseconds"));
-        assert!(
-            suspect_unit(flight, ns(1403715273262142, 1403715418762142))
-                .unwrap()
-                .contains("the latter look like micro")
-        );
-        assert_eq!(suspect_unit(flight, ns(1503715273262142976, 1503715273262142976)), None);
-        assert_eq!(suspect_unit(flight, ns(0, 0)), None);
     }
 
     proptest! {

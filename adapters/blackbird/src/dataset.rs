@@ -10,8 +10,8 @@ use vice_core::error::{DataError, DataResult};
 use vice_core::frames::{BodyFromCamera, World};
 use vice_core::imu::{ImuSample, InertialState};
 use vice_core::time::{Span, Stamp};
+use vice_core::time_unit::unit_mixup;
 use vice_core::trajectory::Trajectory;
-use vice_files::trajectory::suspect_unit;
 use vice_video::{Ffmpeg, reference_state};
 
 use crate::camera::CameraFrames;
@@ -106,10 +106,7 @@ impl BlackbirdDataset {
 /// Refuses two files whose stamps only agree if one of them is in another unit; blames the one whose years are odd.
 fn same_clock(a: (&Path, (Stamp, Stamp)), b: (&Path, (Stamp, Stamp))) -> DataResult<()> {
     let (suspect, expected) = if PLAUSIBLE_NS.contains(&a.1.0.as_nanos()) { (b, a) } else { (a, b) };
-    match suspect_unit(expected.1, suspect.1) {
-        Some(suspicion) => Err(DataError::new(suspicion).at(suspect.0)),
-        None => Ok(()),
-    }
+    unit_mixup(expected.1, suspect.1).map_or(Ok(()), |error| Err(error.at(suspect.0)))
 }
 
 /// The last three folders of a flight's path, `picasso_yawForward_maxSpeed1p0`.

@@ -82,11 +82,13 @@ pub(crate) fn check_unit(a: (&Path, (Stamp, Stamp)), b: (&Path, (Stamp, Stamp)))
         (false, true) => (b, a),
         _ => return Ok(()),
     };
-    let suspicion = vice_files::trajectory::suspect_unit(other.1, suspect.1).unwrap_or_else(|| {
+    let error = vice_core::time_unit::unit_mixup(other.1, suspect.1).unwrap_or_else(|| {
         let ((from, to), (other_from, other_to)) = (suspect.1, other.1);
-        format!("the stamps run from {from} to {to} ns, where {other_from} to {other_to} ns is expected")
+        DataError::new(format!(
+            "the stamps run from {from} to {to} ns, where {other_from} to {other_to} ns is expected"
+        ))
     });
-    Err(DataError::new(suspicion).at(suspect.0).hint(format!("compared with {}", other.0.display())))
+    Err(error.at(suspect.0).hint(format!("compared with {}", other.0.display())))
 }
 
 /// Names in a folder that are symbolic links. A folder that cannot be read has none: opening an image will say so.

@@ -12,8 +12,9 @@ use vice_core::error::{DataError, DataResult};
 use vice_core::frames::BodyFromCamera;
 use vice_core::imu::{ImuSample, InertialState};
 use vice_core::time::Stamp;
+use vice_core::time_unit::unit_mixup;
 use vice_core::trajectory::Trajectory;
-use vice_files::trajectory::{ReadOptions, suspect_unit};
+use vice_files::trajectory::ReadOptions;
 use vice_files::{paths, rows};
 
 use crate::description::Description;
@@ -154,10 +155,9 @@ impl Dataset for VideoDataset {
         let path = beside(&self.file, relative)?;
         let trajectory = vice_files::trajectory::read(&path, &ReadOptions::default())?.trajectory;
         let frames = self.film.frames()?;
-        if let Some(suspicion) =
-            suspect_unit((frames[0], frames[frames.len() - 1]), (trajectory.start(), trajectory.end()))
-        {
-            return Err(DataError::new(suspicion).at(&path));
+        let frames = (frames[0], frames[frames.len() - 1]);
+        if let Some(error) = unit_mixup(frames, (trajectory.start(), trajectory.end())) {
+            return Err(error.at(&path));
         }
         Ok(trajectory)
     }

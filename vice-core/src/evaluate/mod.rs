@@ -144,7 +144,7 @@ pub enum EvaluateError {
     },
     /// No label is at a frame.
     #[error("none of the labels is at a frame: labels {} to {} ns, frames {} to {} ns{}",
-        labels.0, labels.1, frames.0, frames.1, suspicion.as_ref().map_or_else(String::new, |s| format!(" ({s})")))]
+        labels.0, labels.1, frames.0, frames.1, suspicion.as_ref().map_or_else(String::new, |s| format!(" (the labels look like {s})")))]
     NoLabelAtFrame {
         /// First and last label.
         labels: (Stamp, Stamp),
@@ -166,7 +166,7 @@ pub enum EvaluateError {
     },
     /// A stream has no pose within the evaluated frames.
     #[error("stream {stream} and the evaluated frames do not overlap in time: poses {} to {} ns, frames {} to {} ns{}",
-        poses.0, poses.1, frames.0, frames.1, suspicion.as_ref().map_or_else(String::new, |s| format!(" ({s})")))]
+        poses.0, poses.1, frames.0, frames.1, suspicion.as_ref().map_or_else(String::new, |s| format!(" (the poses look like {s})")))]
     NoOverlap {
         /// The stream.
         stream: String,

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use super::{EvaluateError, SkipReason};
 use crate::camera::Camera;
 use crate::label::{LabelSet, Observation};
-use crate::time::{Span, Stamp, suspect_unit};
+use crate::time::{Span, Stamp};
+use crate::time_unit::suspect_unit;
 
 /// The part of a run that is evaluated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -167,7 +168,7 @@ fn check_inside(labels: &LabelSet, camera: &Camera) -> Result<(), EvaluateError>
 fn no_label_at_a_frame(labels: &LabelSet, frames: (Stamp, Stamp)) -> EvaluateError {
     let stamps = || labels.points().iter().flat_map(|p| &p.observations).map(|o| o.stamp);
     let labels = (stamps().min().unwrap_or_default(), stamps().max().unwrap_or_default());
-    EvaluateError::NoLabelAtFrame { labels, frames, suspicion: suspect_unit(labels, frames) }
+    EvaluateError::NoLabelAtFrame { labels, frames, suspicion: suspect_unit(frames, labels) }
 }
 
 /// The frames of the window.

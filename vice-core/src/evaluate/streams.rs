@@ -6,7 +6,8 @@ use crate::metrics::align::{Alignment, align};
 use crate::metrics::associate::PosePairs;
 use crate::metrics::trajectory::Summary;
 use crate::result::{Role, TrajectoryPart};
-use crate::time::{Span, Stamp, suspect_unit};
+use crate::time::{Span, Stamp};
+use crate::time_unit::suspect_unit;
 use crate::trajectory::{NoPose, Trajectory};
 
 /// A named pose stream that is evaluated or compared with.
@@ -33,7 +34,7 @@ impl Stream {
         if poses.0 <= frames.1 && frames.0 <= poses.1 {
             return Ok(());
         }
-        let suspicion = suspect_unit(poses, frames);
+        let suspicion = suspect_unit(frames, poses);
         Err(EvaluateError::NoOverlap { stream: self.name.clone(), poses, frames, suspicion })
     }
 }

@@ -6,6 +6,7 @@
 use crate::error::{DataError, DataResult};
 use crate::frames::WorldFromBody;
 use crate::time::{Span, Stamp};
+use crate::time_unit::suspect_unit;
 use crate::trajectory::Trajectory;
 
 /// How poses of the reference are found for poses of the estimate.
@@ -49,8 +50,7 @@ pub struct PosePairs {
 /// earlier stamps, and each pose is used once. The pairs come in order of time. Costs O(n log m).
 ///
 /// # Errors
-/// [`DataError`] if nothing matches; it prints both time ranges and suspects the unit where they differ by 1e3, 1e6
-/// or 1e9.
+/// [`DataError`] if nothing matches; it prints both time ranges and the unit that may be mixed up.
 pub fn associate(
     reference: &Trajectory,
     estimate: &Trajectory,
@@ -243,41 +243,13 @@ fn nothing_matches(reference: &Trajectory, estimate: &Trajectory, t_offset: Span
         e0.to_seconds_text(),
         e1.to_seconds_text()
     ));
-    match suspected_unit((r0, r1), (e0, e1)) {
-        Some(hint) => error.hint(hint),
+    match suspect_unit((r0, r1), (e0, e1)) {
+        Some(mixed_up) => error.hint(format!("the estimate's times look like {mixed_up}")),
         None if e1 < r0 || r1 < e0 => {
             error.hint("the two do not overlap in time; are their clocks the same?")
         }
         None => error.hint("the two overlap, but their stamps are further apart than that"),
     }
-}
-
-/// Which stamps were read in the wrong unit, where one range is about 1e3, 1e6 or 1e9 times the other.
-fn suspected_unit(reference: (Stamp, Stamp), estimate: (Stamp, Stamp)) -> Option<String> {
-    let middle = |(a, b): (Stamp, Stamp)| (a.as_secs_f64() + b.as_secs_f64()).abs() / 2.0;
-    let length = |(a, b): (Stamp, Stamp)| (b - a).as_secs_f64();
-    // Stamps since an epoch show it in their size, stamps since the start in their range.
-    let factor = |r: f64, e: f64| {
-        let decades = (e / r).log10();
-        let rounded = (decades / 3.0).round() as i32;
-        (decades.is_finite() && (decades - 3.0 * f64::from(rounded)).abs() < 0.2).then_some(rounded)
-    };
-    let (thousands, larger, smaller) =
-        [middle, length].iter().find_map(|size| match factor(size(reference), size(estimate)) {
-            Some(n @ 1..=3) => Some((n, "estimate", "reference")),
-            Some(n @ -3..=-1) => Some((-n, "reference", "estimate")),
-            _ => None,
-        })?;
-    let (as_nanos, as_seconds) = match thousands {
-        1 => ("µs", "ms"),
-        2 => ("ms", "µs"),
-        _ => ("s", "ns"),
-    };
-    Some(format!(
-        "the {larger}'s times are about 1e{} times the {smaller}'s; is the {smaller} in {as_nanos} where ns are \
-         expected, or the {larger} in {as_seconds} where s are expected?",
-        3 * thousands
-    ))
 }
 
 #[cfg(test)]
@@ -338,15 +310,15 @@ mod tests {
         };
         let seconds = error(&[1_403_715_278, 1_403_715_280]);
         assert!(seconds.contains("from 1403715278.000000000 s to 1403715280.000000000 s"), "{seconds}");
-        assert!(seconds.contains("is the estimate in s where ns are expected"), "{seconds}");
-        assert!(error(&[t0 / 1_000_000]).contains("the estimate in ms where ns are"));
-        assert!(error(&[t0 / 1000]).contains("the estimate in µs where ns are"));
+        assert!(seconds.contains("look like seconds read as nanoseconds"), "{seconds}");
+        assert!(error(&[t0 / 1_000_000]).contains("look like milliseconds read as nanoseconds"));
+        assert!(error(&[t0 / 1000]).contains("look like microseconds read as nanoseconds"));
         assert!(error(&[t0 + 60_000_000_000]).contains("do not overlap in time"));
         assert!(error(&[t0 + 1_000_000_000]).contains("the two overlap"));
         // Times since the start: the range shows it, the epoch does not.
         let (r, e) = (at([100_000_000_000, 200_000_000_000]), at([100, 200]));
         let error = associate(&r, &e, Span::from_millis(10), Span::ZERO).unwrap_err().to_string();
-        assert!(error.contains("the estimate in s where ns are"), "{error}");
+        assert!(error.contains("look like seconds read as nanoseconds"), "{error}");
     }
 
     #[test]

@@ -11,7 +11,6 @@
 //! columns, so they are asked for by name: `rel:FILE`.
 
 mod parse;
-mod units;
 mod write;
 
 use std::path::{Path, PathBuf};
@@ -21,7 +20,6 @@ use vice_core::error::{DataError, DataResult};
 use vice_core::trajectory::{Trajectory, TrajectoryError};
 
 pub use parse::{Parsed, read_relative_rows, read_rows};
-pub use units::suspect_unit;
 pub use write::{write_euroc, write_kitti, write_relative, write_tum};
 
 /// A format of trajectories.
