@@ -22,7 +22,7 @@ mod scene;
 pub mod zcam;
 pub mod zmap;
 
-pub use cloud::{Cloud, CloudOptions, load_cloud};
+pub use cloud::{Cloud, CloudOptions, ScanPoints, load_cloud, read_ply_points};
 pub use floor::FloorDepth;
 pub use floor_fit::{FloorFit, FloorFitOptions, fit_floor_to_cloud, fit_floor_to_depth_image};
 pub use image::{DepthMap, depth_image};

@@ -218,7 +218,7 @@ mod tests {
             assert_eq!(z(u, v), Err(DepthMiss::OutsideImage));
         }
         assert_eq!(at(&image, 2.0, 1.0, [0.2, 3.0]), Err(DepthMiss::OutOfRange));
-        assert_eq!(at(&image, 1.5, 0.5, [0.2, 3.0]).unwrap().on_edge, false);
+        assert!(!at(&image, 1.5, 0.5, [0.2, 3.0]).unwrap().on_edge);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use vice_core::error::{DataError, DataResult};
 
 use super::memory::shown;
-use super::{BYTES_PER_POINT, CloudOptions, memory};
+use super::{BYTES_PER_POINT, CloudOptions, ScanPoints, memory};
 use crate::ply::PointSink;
 
 /// Smallest cube that thinning may use, metres.
@@ -15,15 +15,15 @@ const MIN_CAPACITY: usize = 1 << 16;
 
 /// Points on their way into a cloud.
 pub(super) struct Collector {
-    pub(super) points: Vec<[f32; 3]>,
+    points: Vec<[f32; 3]>,
     /// Added to each point: coordinates in the millions do not fit single precision.
-    pub(super) origin_m: [f64; 3],
+    origin_m: [f64; 3],
     /// Points offered so far.
-    pub(super) offered: u64,
+    offered: u64,
     /// Of these, how many were not finite.
-    pub(super) left_out: u64,
+    left_out: u64,
     /// Position in the file of the first of those.
-    pub(super) first_left_out: Option<u64>,
+    first_left_out: Option<u64>,
     promised: u64,
     max_bytes: u64,
     voxel_m: Option<f64>,
@@ -49,12 +49,26 @@ impl Collector {
         })
     }
 
-    /// Thins what is left and says how many points there are.
-    pub(super) fn finish(&mut self) {
+    /// What has been gathered, thinned to the end.
+    pub(super) fn finish(mut self, name: &str) -> DataResult<ScanPoints> {
+        let Self { offered, left_out, origin_m, .. } = self;
         if let Some(edge) = self.voxel_m {
             thin(&mut self.points, edge);
         }
         self.points.shrink_to_fit();
+        if self.points.is_empty() {
+            let problem = match offered {
+                0 => "there are no points".to_string(),
+                _ => format!("none of the {offered} points is finite"),
+            };
+            return Err(DataError::new(problem));
+        }
+        if let Some(first) = self.first_left_out {
+            tracing::warn!(
+                "{name}: {left_out} of {offered} points are not finite and were left out (the first is point {first})"
+            );
+        }
+        Ok(ScanPoints { origin_m, points: self.points })
     }
 
     fn leave_out(&mut self) {
@@ -176,12 +190,12 @@ mod tests {
             for i in 0..1_000_000 {
                 collector.single(grid(order(i))).unwrap();
             }
-            collector.finish();
-            (collector.points, collector.offered)
+            assert_eq!(collector.offered, 1_000_000);
+            collector.finish("test").unwrap().points
         };
-        let (forward, offered) = collect(&|i| i);
-        assert_eq!((forward.len(), offered), (1000, 1_000_000));
-        assert!(collect(&|i| (i * 7919) % 1_000_000).0 == forward);
+        let forward = collect(&|i| i);
+        assert_eq!(forward.len(), 1000);
+        assert!(collect(&|i| (i * 7919) % 1_000_000) == forward);
         assert!(Collector::new(&options(Some(0.0), 1)).is_err());
         assert!(Collector::new(&options(Some(f64::NAN), 1)).is_err());
     }

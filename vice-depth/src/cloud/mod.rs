@@ -38,7 +38,32 @@ pub struct CloudOptions {
     pub max_bytes: Option<u64>,
 }
 
+/// Points of a scan before they are indexed, in the order of the file, at least one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScanPoints {
+    /// Added to each point, metres; zero for a file in single precision.
+    pub origin_m: [f64; 3],
+    /// Metres, all finite.
+    pub points: Vec<[f32; 3]>,
+}
+
+/// Reads the points of a PLY file: text or binary, any order and type of properties. Faces are not looked at.
+///
+/// Points that are not finite are left out, which a warning says.
+///
+/// # Errors
+/// [`DataError`] with the byte or line if the file cannot be used, ends too early, has no finite point, or does not
+/// fit in memory.
+pub fn read_ply_points(path: impl AsRef<Path>, options: &CloudOptions) -> DataResult<ScanPoints> {
+    let path = path.as_ref();
+    let mut collector = Collector::new(options)?;
+    ply::read_points(path, &mut collector)?;
+    collector.finish(&path.display().to_string()).map_err(|e| e.at(path))
+}
+
 /// The points of a scan, metres, in the frame of the scan.
+///
+/// A cloud that is kilometres wide is suspected to be in millimetres, which a warning says.
 #[derive(Clone, Debug)]
 pub struct Cloud {
     points: Vec<[f32; 3]>,
@@ -47,20 +72,13 @@ pub struct Cloud {
 }
 
 impl Cloud {
-    /// Reads a PLY file: text or binary, any order and type of properties. Faces are not looked at.
-    ///
-    /// Points that are not finite are left out, and a cloud that is kilometres wide is suspected to be in
-    /// millimetres: both are said in a warning.
+    /// Reads a PLY file, as [`read_ply_points`] does, and indexes it.
     ///
     /// # Errors
-    /// [`DataError`] with the byte or line if the file cannot be used, ends too early, has no finite point, or does
-    /// not fit in memory.
+    /// As [`read_ply_points`].
     pub fn read_ply(path: impl AsRef<Path>, options: &CloudOptions) -> DataResult<Self> {
         let path = path.as_ref();
-        let mut collector = Collector::new(options)?;
-        ply::read_points(path, &mut collector)?;
-        let name = path.display().to_string();
-        Self::of(collector, &name).map_err(|e| e.at(path))
+        Ok(Self::indexed(read_ply_points(path, options)?, &path.display().to_string()))
     }
 
     /// A scan from points in memory, metres.
@@ -78,30 +96,17 @@ impl Cloud {
         for p in points {
             collector.single([p.x, p.y, p.z])?;
         }
-        Self::of(collector, "the cloud")
+        Ok(Self::indexed(collector.finish("the cloud")?, "the cloud"))
     }
 
-    fn of(mut collector: Collector, name: &str) -> DataResult<Self> {
-        collector.finish();
-        let Collector { mut points, origin_m, offered, left_out, first_left_out, .. } = collector;
-        if points.is_empty() {
-            let problem = match offered {
-                0 => "there are no points".to_string(),
-                _ => format!("none of the {offered} points is finite"),
-            };
-            return Err(DataError::new(problem));
-        }
-        if let Some(first) = first_left_out {
-            tracing::warn!(
-                "{name}: {left_out} of {offered} points are not finite and were left out (the first is point {first})"
-            );
-        }
+    fn indexed(points: ScanPoints, name: &str) -> Self {
+        let ScanPoints { origin_m, mut points } = points;
         let tree = Tree::build(&mut points);
         let extent = tree.bounds().size().into_iter().fold(0.0, f32::max);
         if extent > SUSPICIOUS_EXTENT_M {
             tracing::warn!("{name}: the points are spread over {extent:.0} m: is the scan in millimetres?");
         }
-        Ok(Self { points, origin_m: origin_m.into(), tree })
+        Self { points, origin_m: origin_m.into(), tree }
     }
 
     /// Number of points, at least 1.
@@ -137,8 +142,13 @@ impl Cloud {
     }
 
     /// Patch of a leaf.
-    pub(crate) fn patch(&self, leaf: usize) -> &Patch {
+    pub(crate) fn patch(&self, leaf: u32) -> &Patch {
         self.tree.patch(leaf)
+    }
+
+    /// Box of a leaf, relative to [`Cloud::origin_m`].
+    pub(crate) fn bounds_of(&self, leaf: &Leaf) -> &Bounds {
+        self.tree.bounds_of(leaf)
     }
 
     /// Leaves whose boxes (relative to [`Cloud::origin_m`]) are not outside.

@@ -10,6 +10,12 @@ use nalgebra::{Matrix3, Vector3};
 /// Most points of a leaf.
 const LEAF_POINTS: usize = 64;
 
+/// Fewer points than this are not worth quartering.
+const FEWEST_TO_QUARTER: usize = 24;
+
+/// A leaf thinner than this part of its spacing is flat.
+const FLAT: f32 = 0.25;
+
 /// Fewer points than this are not worth a second thread.
 const PARALLEL_POINTS: usize = 1 << 14;
 
@@ -68,7 +74,9 @@ pub(crate) struct Patch {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Leaf {
     /// Which leaf, and which patch.
-    pub(crate) index: usize,
+    pub(crate) index: u32,
+    /// Which node.
+    node: u32,
     /// Its first point.
     pub(crate) start: usize,
     /// Behind its last point.
@@ -116,8 +124,13 @@ impl Tree {
     }
 
     /// Patch of a leaf.
-    pub(crate) fn patch(&self, leaf: usize) -> &Patch {
-        &self.patches[leaf]
+    pub(crate) fn patch(&self, leaf: u32) -> &Patch {
+        &self.patches[leaf as usize]
+    }
+
+    /// Box of a leaf, metres.
+    pub(crate) fn bounds_of(&self, leaf: &Leaf) -> &Bounds {
+        &self.boxes[leaf.node as usize]
     }
 
     /// Bytes that the index takes.
@@ -141,7 +154,8 @@ impl Tree {
                 Overlap::Inside => true,
             };
         if node.level == 0 {
-            found.push(Leaf { index: node.leaf, start: node.start, end: node.end });
+            let (index, at) = (node.leaf as u32, node.at as u32);
+            found.push(Leaf { index, node: at, start: node.start, end: node.end });
             return;
         }
         for half in node.halves() {
@@ -202,9 +216,47 @@ fn halve(points: &mut [[f32; 3]], cell: Bounds, boxes: &mut [Bounds], patches: &
     *node = below[0].joined(&below[half]);
 }
 
+/// The patch that points most likely are.
+///
+/// A leaf at the edge of a box holds points of two or three surfaces, and one plane through all of them is neither
+/// near them nor as sparse as they are: discs of its size would hide what is beside the box, and its thickness would
+/// let triangles span the edge. So a leaf that is not flat is quartered, and its quarters say how sparse and how thick
+/// a surface is.
+fn fit(points: &mut [[f32; 3]]) -> Patch {
+    let whole = flat_fit(points);
+    if points.len() < FEWEST_TO_QUARTER || whole.thickness_m < FLAT * whole.spacing_m {
+        return whole;
+    }
+    let mut quarters = [whole; 4];
+    let (low, high) = halves(points);
+    for (half, place) in [low, high].into_iter().zip([0, 2]) {
+        let (first, second) = halves(half);
+        (quarters[place], quarters[place + 1]) = (flat_fit(first), flat_fit(second));
+    }
+    // The second smallest of four: up to two quarters may straddle an edge themselves.
+    let typical = |value: fn(&Patch) -> f32| {
+        let mut values = quarters.map(|q| value(&q));
+        values.sort_by(f32::total_cmp);
+        values[1]
+    };
+    let (spacing_m, thickness_m) = (typical(|q| q.spacing_m), typical(|q| q.thickness_m));
+    Patch {
+        spacing_m: spacing_m.min(whole.spacing_m),
+        thickness_m: thickness_m.min(whole.thickness_m),
+        ..whole
+    }
+}
+
+/// The two halves of points across the widest side of their box.
+fn halves(points: &mut [[f32; 3]]) -> (&mut [[f32; 3]], &mut [[f32; 3]]) {
+    let (axis, middle) = (Bounds::of(points).widest(), points.len() / 2);
+    points.select_nth_unstable_by(middle, |a, b| a[axis].total_cmp(&b[axis]));
+    points.split_at_mut(middle)
+}
+
 /// The flat patch through points, by their moments: evenly spread over a rectangle or an ellipse of area `A` they
 /// have `A = 12 √(λ1 λ2)` with the two larger eigenvalues of their covariance, to within 5 %.
-fn fit(points: &[[f32; 3]]) -> Patch {
+fn flat_fit(points: &[[f32; 3]]) -> Patch {
     let n = points.len().max(1) as f64;
     let at = |p: &[f32; 3]| Vector3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
     let mean = points.iter().map(at).sum::<Vector3<f64>>() / n;

@@ -6,6 +6,7 @@
 //! pixel is moved by up to a billionth, by a hash of itself.
 
 use rayon::prelude::*;
+use spade::handles::{FixedFaceHandle, InnerTag};
 use spade::{DelaunayTriangulation, HasPosition, Point2, PositionInTriangulation, Triangulation};
 use vice_core::camera::Pixel;
 use vice_core::depth::{DepthMiss, DepthSample};
@@ -22,6 +23,11 @@ const STEP_SPACINGS: f64 = 3.0;
 
 /// The same over the standard deviation across the surface.
 const STEP_NOISE: f64 = 4.0;
+
+/// Faces that a thread fills in one go.
+const FACES_AT_ONCE: usize = 1 << 12;
+
+type Answer = Result<DepthSample, DepthMiss>;
 
 /// What makes a triangle unfit to interpolate in.
 #[derive(Clone, Copy)]
@@ -62,7 +68,7 @@ struct Triangle {
 /// What a part of the points says about a pixel.
 pub(super) enum Local {
     /// No other points can change this.
-    Certain(Result<DepthSample, DepthMiss>),
+    Certain(Answer),
     /// It takes more points to know.
     Uncertain,
 }
@@ -71,12 +77,13 @@ impl<'a> Surface<'a> {
     /// Triangulates. Of points at one pixel the nearest is kept, so that their order does not matter.
     pub(super) fn new(mut points: Vec<Seen>, limits: Limits<'a>) -> DataResult<Self> {
         points.par_iter_mut().for_each(jitter);
-        points.par_sort_unstable_by(by_pixel);
-        points.dedup_by(|b, a| a.u == b.u && a.v == b.v);
-        let corner = |(point, s): (u32, &Seen)| Corner { at: Point2::new(s.u, s.v), point };
-        let corners = (0..).zip(&points).map(corner).collect();
-        let triangles = DelaunayTriangulation::bulk_load(corners)
-            .map_err(|e| DataError::new("the projected cloud cannot be triangulated").because(e))?;
+        let mut triangles = triangulated(&points)?;
+        // Points at one pixel are rare enough to look for them only where there are some.
+        if triangles.num_vertices() < points.len() {
+            points.par_sort_unstable_by(by_pixel);
+            points.dedup_by(|b, a| a.u == b.u && a.v == b.v);
+            triangles = triangulated(&points)?;
+        }
         Ok(Self { points, triangles, limits })
     }
 
@@ -113,33 +120,50 @@ impl<'a> Surface<'a> {
     }
 
     /// Depths of many pixels: each triangle fills those that it covers.
-    pub(super) fn fill(
-        &self,
-        pixels: &[Pixel],
-        wanted: &[usize],
-        out: &mut [Result<DepthSample, DepthMiss>],
-    ) {
+    pub(super) fn fill(&self, pixels: &[Pixel], wanted: &[usize], out: &mut [Answer]) {
         let nothing = if self.points.is_empty() { DepthMiss::EmptyView } else { DepthMiss::OutsideHull };
         for i in wanted {
             out[*i] = Err(nothing);
         }
         let queries = Queries::new(pixels, wanted);
-        for face in self.triangles.inner_faces() {
-            let triangle = self.triangle(face.vertices().map(|v| v.data().point));
-            let mut unfit = None;
-            queries.covered_by(triangle.corners.map(|c| Pixel::new(c.u, c.v)), |i| {
-                let unfit = *unfit.get_or_insert_with(|| triangle.unfit(&self.limits));
-                // On an edge between two triangles the one that has an answer is taken.
-                if out[i].is_err() {
-                    out[i] = unfit.map_or_else(|| Ok(triangle.at(pixels[i])), Err);
-                }
+        let faces: Vec<_> = self.triangles.fixed_inner_faces().collect();
+        let hits: Vec<Vec<_>> =
+            faces.par_chunks(FACES_AT_ONCE).map(|faces| self.hits(&queries, faces)).collect();
+        // In the order of the faces. On an edge between two triangles the one that has an answer is taken.
+        for (i, answer) in hits.into_iter().flatten() {
+            if out[i].is_err() {
+                out[i] = answer;
+            }
+        }
+    }
+
+    /// Pixels that some faces cover, with their depths.
+    fn hits(&self, queries: &Queries<'_>, faces: &[FixedFaceHandle<InnerTag>]) -> Vec<(usize, Answer)> {
+        let mut hits = Vec::new();
+        for face in faces {
+            let corners = self.triangles.face(*face).vertices();
+            let mut known = None;
+            queries.covered_by(corners.map(|c| c.position()).map(|p| Pixel::new(p.x, p.y)), |i, px| {
+                let (triangle, unfit) = known.get_or_insert_with(|| {
+                    let triangle = self.triangle(corners.map(|c| c.data().point));
+                    let unfit = triangle.unfit(&self.limits);
+                    (triangle, unfit)
+                });
+                hits.push((i, unfit.map_or_else(|| Ok(triangle.at(px)), Err)));
             });
         }
+        hits
     }
 
     fn triangle(&self, points: [u32; 3]) -> Triangle {
         Triangle::new(points.map(|p| self.points[p as usize]))
     }
+}
+
+fn triangulated(points: &[Seen]) -> DataResult<DelaunayTriangulation<Corner>> {
+    let corner = |(point, s): (u32, &Seen)| Corner { at: Point2::new(s.u, s.v), point };
+    DelaunayTriangulation::bulk_load((0..).zip(points).map(corner).collect())
+        .map_err(|e| DataError::new("the projected cloud cannot be triangulated").because(e))
 }
 
 impl Triangle {
@@ -154,7 +178,7 @@ impl Triangle {
     }
 
     /// Depth of a pixel, or why there is none.
-    fn depth(&self, limits: &Limits<'_>, at: Pixel) -> Result<DepthSample, DepthMiss> {
+    fn depth(&self, limits: &Limits<'_>, at: Pixel) -> Answer {
         self.unfit(limits).map_or_else(|| Ok(self.at(at)), Err)
     }
 
@@ -194,7 +218,7 @@ fn in_camera(seen: &Seen) -> nalgebra::Vector3<f64> {
     nalgebra::Vector3::new(f64::from(seen.ray[0]), f64::from(seen.ray[1]), 1.0) * seen.z_m
 }
 
-fn by_pixel(a: &Seen, b: &Seen) -> std::cmp::Ordering {
+pub(super) fn by_pixel(a: &Seen, b: &Seen) -> std::cmp::Ordering {
     a.u.total_cmp(&b.u).then(a.v.total_cmp(&b.v)).then(a.z_m.total_cmp(&b.z_m)).then(a.leaf.cmp(&b.leaf))
 }
 

@@ -5,12 +5,14 @@
 //! pixel cannot change any more, which gives the very number that the whole image would. Many pixels, such as a depth
 //! image, are answered by triangulating the whole image once.
 
+mod buffer;
 mod interpolate;
 mod occlude;
 mod queries;
 mod select;
 #[cfg(test)]
 mod tests;
+mod thin;
 
 use std::sync::Arc;
 
@@ -29,7 +31,7 @@ use select::{Seen, View, Window};
 const MOST_WINDOWS: usize = 64;
 
 /// Half the side of the first window around a pixel.
-const FIRST_HALF_PX: f64 = 12.0;
+const FIRST_HALF_PX: f64 = 3.0;
 
 /// How far outside the image points are taken in, over the focal length, so that their hull covers it.
 const MARGIN: f64 = 0.03;
@@ -42,7 +44,8 @@ const LARGEST_PART: f64 = 0.25;
 pub struct ZMapOptions {
     /// Whether points behind a surface are dropped, and pixels on an occlusion edge refused. Without it the paper's
     /// Z-map is reproduced: points behind a surface leak through. With it, points just outside the image help too,
-    /// so that the hull of the points covers the image.
+    /// so that the hull of the points covers the image, and where there are more than four points to a pixel (or to
+    /// two milliradians, if that is more) one of each quarter is taken.
     pub occlusion: bool,
     /// Widest triangle that is trusted: its longest edge over the focal length, by default 0.1, which is 46 pixels
     /// at a focal length of 460.
@@ -73,6 +76,19 @@ impl ZMapDepth {
         Self { cloud, world_from_cloud, options }
     }
 
+    /// The points of a key frame between which depth is interpolated, in no order that matters: their pixels
+    /// and their depths in metres. Empty without an anchor.
+    pub fn visible(&self, keyframe: &Keyframe<'_>) -> Vec<(Pixel, f64)> {
+        let Some(camera_from_cloud) = self.camera_from_cloud(keyframe) else { return Vec::new() };
+        let view = View::new(&self.cloud, keyframe.camera, &camera_from_cloud);
+        let points = self.points(&view, &self.region(keyframe.camera));
+        points.into_iter().map(|s| (Pixel::new(s.u, s.v), s.z_m)).collect()
+    }
+
+    fn camera_from_cloud(&self, keyframe: &Keyframe<'_>) -> Option<Rigid<frames::Camera, frames::Cloud>> {
+        keyframe.world_from_camera.map(|pose| pose.inverse() * self.world_from_cloud)
+    }
+
     /// The part of the image plane whose points are triangulated.
     fn region(&self, camera: &Camera) -> Window {
         let [fx, ..] = camera.fx_fy_cx_cy();
@@ -96,9 +112,10 @@ impl ZMapDepth {
         region: &Window,
         pixel: Pixel,
     ) -> DataResult<Option<Result<DepthSample, DepthMiss>>> {
+        let cell_px = occlude::cell_px(view.camera());
         let mut half_px = FIRST_HALF_PX;
         loop {
-            let window = Window::around(pixel, half_px).within(region);
+            let window = Window::around(pixel, half_px, cell_px).within(region);
             if window.area_px2() > LARGEST_PART * region.area_px2() {
                 return Ok(None);
             }
@@ -121,11 +138,10 @@ impl DepthSource for ZMapDepth {
         keyframe: &Keyframe<'_>,
         pixels: &[Pixel],
     ) -> DataResult<Vec<Result<DepthSample, DepthMiss>>> {
-        let Some(world_from_camera) = keyframe.world_from_camera else {
+        let Some(camera_from_cloud) = self.camera_from_cloud(keyframe) else {
             return Ok(vec![Err(DepthMiss::NoAnchor); pixels.len()]);
         };
         let camera = keyframe.camera;
-        let camera_from_cloud = world_from_camera.inverse() * self.world_from_cloud;
         let view = View::new(&self.cloud, camera, &camera_from_cloud);
         let region = self.region(camera);
         let mut out = vec![Err(DepthMiss::OutsideImage); pixels.len()];

@@ -15,7 +15,13 @@ pub(super) struct Queries<'a> {
 }
 
 fn cell(at: f64) -> i64 {
-    (at + 0.5).floor() as i64
+    floor(at + 0.5)
+}
+
+/// Largest integer that is not larger. The method of `f64` is a function call on a plain x86-64.
+pub(super) fn floor(x: f64) -> i64 {
+    let towards_zero = x as i64;
+    towards_zero - i64::from(x < towards_zero as f64)
 }
 
 impl<'a> Queries<'a> {
@@ -58,30 +64,49 @@ impl<'a> Queries<'a> {
     }
 
     /// Calls `hit` with each pixel that lies in a triangle or on its border.
-    pub(super) fn covered_by(&self, corners: [Pixel; 3], mut hit: impl FnMut(usize)) {
+    pub(super) fn covered_by(&self, corners: [Pixel; 3], mut hit: impl FnMut(usize, Pixel)) {
         let [a, b, c] = corners;
-        let range = |low: f64, high: f64, axis: usize, count: usize| {
-            let (low, high) = (cell(low) - self.first[axis], cell(high) - self.first[axis]);
-            (low.max(0), high.min(count as i64 - 1))
+        let (left, right) = (a.u.min(b.u).min(c.u), a.u.max(b.u).max(c.u));
+        let (top, bottom) = (a.v.min(b.v).min(c.v), a.v.max(b.v).max(c.v));
+        let inside = |px: Pixel| {
+            // Most triangles of a dense cloud lie between pixels.
+            if px.u < left || px.u > right || px.v < top || px.v > bottom {
+                return false;
+            }
+            let sides = [side(a, b, px), side(b, c, px), side(c, a, px)];
+            sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0)
         };
-        let (top, bottom) = range(a.v.min(b.v).min(c.v), a.v.max(b.v).max(c.v), 1, self.rows);
-        for row in top..=bottom {
-            let centre = (row + self.first[1]) as f64;
-            let Some((left, right)) = extent(&corners, centre - 0.5, centre + 0.5) else { continue };
-            let (left, right) = range(left, right, 0, self.columns);
-            if left > right {
+        let (first_row, last_row) = self.range(top, bottom, 1, self.rows);
+        for row in first_row..=last_row {
+            // Within a few columns looking closer would cost more than it saves.
+            let (from, to) = if right - left < 4.0 {
+                (left, right)
+            } else {
+                let centre = (row + self.first[1]) as f64;
+                extent(&corners, centre - 0.5, centre + 0.5)
+            };
+            if from > to {
+                continue;
+            }
+            let (from, to) = self.range(from, to, 0, self.columns);
+            if from > to {
                 continue;
             }
             let row = row as usize * self.columns;
-            let (first, last) = (self.starts[row + left as usize], self.starts[row + right as usize + 1]);
+            let (first, last) = (self.starts[row + from as usize], self.starts[row + to as usize + 1]);
             for entry in &self.entries[first as usize..last as usize] {
                 let px = self.pixels[*entry as usize];
-                let sides = [side(a, b, px), side(b, c, px), side(c, a, px)];
-                if sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0) {
-                    hit(*entry as usize);
+                if inside(px) {
+                    hit(*entry as usize, px);
                 }
             }
         }
+    }
+
+    /// Rows (or columns) of the grid between two places; empty where the first is behind the last.
+    fn range(&self, low: f64, high: f64, axis: usize, count: usize) -> (i64, i64) {
+        let (low, high) = (cell(low) - self.first[axis], cell(high) - self.first[axis]);
+        (low.max(0), high.min(count as i64 - 1))
     }
 }
 
@@ -93,7 +118,7 @@ fn side(p: Pixel, q: Pixel, at: Pixel) -> f64 {
 }
 
 /// From where to where a triangle reaches between two rows, to the right.
-fn extent(corners: &[Pixel; 3], top: f64, bottom: f64) -> Option<(f64, f64)> {
+fn extent(corners: &[Pixel; 3], top: f64, bottom: f64) -> (f64, f64) {
     let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
     let mut reach = |u: f64| (left, right) = (left.min(u), right.max(u));
     for i in 0..3 {
@@ -107,5 +132,5 @@ fn extent(corners: &[Pixel; 3], top: f64, bottom: f64) -> Option<(f64, f64)> {
             }
         }
     }
-    (left <= right).then_some((left, right))
+    (left, right)
 }

@@ -57,9 +57,11 @@ impl Window {
         }
     }
 
-    /// What lies within `half_px` of a pixel.
-    pub(crate) fn around(at: Pixel, half_px: f64) -> Self {
-        Self { low: at, high: at }.grown(half_px)
+    /// What lies within `half_px` of a pixel, widened to whole cells of `cell_px`.
+    pub(crate) fn around(at: Pixel, half_px: f64, cell_px: f64) -> Self {
+        let low = |px: f64| ((px - half_px + 0.5) / cell_px).floor() * cell_px - 0.5;
+        let high = |px: f64| ((px + half_px + 0.5) / cell_px).ceil() * cell_px - 0.5;
+        Self { low: Pixel::new(low(at.u), low(at.v)), high: Pixel::new(high(at.u), high(at.v)) }
     }
 
     /// With a margin around it.
@@ -134,8 +136,25 @@ impl<'a> View<'a> {
             }
             let px = view.camera.project(&in_camera).ok().filter(|px| window.contains(*px))?;
             let ray = [(in_camera.x / in_camera.z) as f32, (in_camera.y / in_camera.z) as f32];
-            Some(Seen { u: px.u, v: px.v, z_m: in_camera.z, ray, leaf: leaf.index as u32 })
+            Some(Seen { u: px.u, v: px.v, z_m: in_camera.z, ray, leaf: leaf.index })
         })
+    }
+
+    /// Leaves that may have points in the windows that `window_of` gives for them: one of `windows` by its place.
+    pub(crate) fn leaves_in(&self, windows: &[Window], window_of: impl Fn(&Leaf) -> usize) -> Vec<Leaf> {
+        let sides: Vec<_> = windows.iter().map(|w| self.sides(w)).collect();
+        let Some(largest) = windows.last() else { return Vec::new() };
+        let mut leaves = self.leaves(largest);
+        leaves
+            .retain(|leaf| overlap(self.cloud.bounds_of(leaf), &sides[window_of(leaf)]) != Overlap::Outside);
+        leaves
+    }
+
+    /// Depth that no point of a leaf is nearer than, metres.
+    pub(crate) fn nearest_m(&self, leaf: &Leaf) -> f64 {
+        let (centre, half) = middle(self.cloud.bounds_of(leaf));
+        let axis = Vector3::from(self.rotation.row(2).transpose());
+        (axis.dot(&centre) + self.translation.z - axis.abs().dot(&half)).max(NEAREST_M)
     }
 
     /// All points in a window, in the order of the index.
@@ -146,7 +165,7 @@ impl<'a> View<'a> {
 
     /// The patch of a leaf in the camera frame.
     pub(crate) fn patch(&self, leaf: u32) -> Facing {
-        let Patch { centre, normal, spacing_m, thickness_m } = *self.cloud.patch(leaf as usize);
+        let Patch { centre, normal, spacing_m, thickness_m } = *self.cloud.patch(leaf);
         Facing {
             centre: self.rotation * Vector3::from(centre.map(f64::from)) + self.translation,
             normal: self.rotation * Vector3::from(normal.map(f64::from)),
@@ -199,8 +218,7 @@ impl<'a> View<'a> {
 }
 
 fn overlap(bounds: &Bounds, sides: &[(Vector3<f64>, f64)]) -> Overlap {
-    let (low, high) = (Vector3::from(bounds.low.map(f64::from)), Vector3::from(bounds.high.map(f64::from)));
-    let (centre, half) = ((low + high) / 2.0, (high - low) / 2.0);
+    let (centre, half) = middle(bounds);
     let mut result = Overlap::Inside;
     for (normal, d) in sides {
         let (at_centre, reach) = (normal.dot(&centre) + d, normal.abs().dot(&half));
@@ -212,4 +230,10 @@ fn overlap(bounds: &Bounds, sides: &[(Vector3<f64>, f64)]) -> Overlap {
         }
     }
     result
+}
+
+/// Centre and half the size of a box.
+fn middle(bounds: &Bounds) -> (Vector3<f64>, Vector3<f64>) {
+    let (low, high) = (Vector3::from(bounds.low.map(f64::from)), Vector3::from(bounds.high.map(f64::from)));
+    ((low + high) / 2.0, (high - low) / 2.0)
 }
