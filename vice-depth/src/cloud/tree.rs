@@ -16,6 +16,13 @@ const FEWEST_TO_QUARTER: usize = 24;
 /// A leaf thinner than this part of its spacing is flat.
 const FLAT: f32 = 0.25;
 
+/// The median distance to the nearest neighbour over the spacing, for points spread at random: `√(ln 2 / π)`.
+const MEDIAN_NEIGHBOUR: f32 = 0.47;
+
+/// A leaf whose points would lie this much further apart if they were spread evenly is scattered over several
+/// surfaces.
+const SCATTERED: f32 = 1.5;
+
 /// Fewer points than this are not worth a second thread.
 const PARALLEL_POINTS: usize = 1 << 14;
 
@@ -218,33 +225,48 @@ fn halve(points: &mut [[f32; 3]], cell: Bounds, boxes: &mut [Bounds], patches: &
 
 /// The patch that points most likely are.
 ///
-/// A leaf at the edge of a box holds points of two or three surfaces, and one plane through all of them is neither
-/// near them nor as sparse as they are: discs of its size would hide what is beside the box, and its thickness would
-/// let triangles span the edge. So a leaf that is not flat is quartered, and its quarters say how sparse and how thick
-/// a surface is.
+/// A leaf at the edge of a box holds points of two or three surfaces, perhaps with nothing between them. One plane
+/// through all of them is neither near them nor as dense as they are: discs as far apart as its points would hide what
+/// is beside the box, and its thickness would let triangles span the edge. So the distance to the nearest neighbour
+/// bounds the spacing, and the quarters of a leaf that is not flat bound its thickness.
 fn fit(points: &mut [[f32; 3]]) -> Patch {
     let whole = flat_fit(points);
-    if points.len() < FEWEST_TO_QUARTER || whole.thickness_m < FLAT * whole.spacing_m {
+    if points.len() < FEWEST_TO_QUARTER {
         return whole;
     }
-    let mut quarters = [whole; 4];
+    let spacing_m = whole.spacing_m.min(median_neighbour_m(points) / MEDIAN_NEIGHBOUR);
+    let scattered = whole.spacing_m > SCATTERED * spacing_m;
+    if !scattered && whole.thickness_m < FLAT * spacing_m {
+        return whole;
+    }
     let (low, high) = halves(points);
-    for (half, place) in [low, high].into_iter().zip([0, 2]) {
+    let mut thickness_m = [low, high].map(|half| {
         let (first, second) = halves(half);
-        (quarters[place], quarters[place + 1]) = (flat_fit(first), flat_fit(second));
+        flat_fit(first).thickness_m.min(flat_fit(second).thickness_m)
+    });
+    // The thicker of the better quarters: one of them may be flat by chance.
+    thickness_m.sort_by(f32::total_cmp);
+    let thickness_m = whole.thickness_m.min(thickness_m[1]);
+    if scattered {
+        return Patch { spacing_m, thickness_m: thickness_m.min(spacing_m), ..whole };
     }
-    // The second smallest of four: up to two quarters may straddle an edge themselves.
-    let typical = |value: fn(&Patch) -> f32| {
-        let mut values = quarters.map(|q| value(&q));
-        values.sort_by(f32::total_cmp);
-        values[1]
-    };
-    let (spacing_m, thickness_m) = (typical(|q| q.spacing_m), typical(|q| q.thickness_m));
-    Patch {
-        spacing_m: spacing_m.min(whole.spacing_m),
-        thickness_m: thickness_m.min(whole.thickness_m),
-        ..whole
+    Patch { thickness_m, ..whole }
+}
+
+/// The median distance from a point to the nearest other one, metres.
+fn median_neighbour_m(points: &[[f32; 3]]) -> f32 {
+    let mut nearest = vec![f32::INFINITY; points.len()];
+    for (i, a) in points.iter().enumerate() {
+        for (j, b) in points.iter().enumerate().skip(i + 1) {
+            let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+            let square = x * x + y * y + z * z;
+            nearest[i] = nearest[i].min(square);
+            nearest[j] = nearest[j].min(square);
+        }
     }
+    let middle = nearest.len() / 2;
+    let (_, median, _) = nearest.select_nth_unstable_by(middle, |a, b| a.total_cmp(b));
+    median.sqrt()
 }
 
 /// The two halves of points across the widest side of their box.
@@ -307,6 +329,21 @@ mod tests {
         let mean = leaves.iter().map(|l| tree.patch(l.index).spacing_m).sum::<f32>() / leaves.len() as f32;
         assert!((mean / spacing - 1.0).abs() < 0.05, "{mean} where {spacing} was expected");
         assert!(tree.bytes() < points.len() * 12 / 5);
+    }
+
+    #[test]
+    fn a_leaf_of_two_surfaces_is_no_sparser_and_no_thicker_than_they_are() {
+        // The edge of a box a centimetre a point, and the ceiling above it.
+        let edge = |n: u16| (0..n).map(|i| [f32::from(i) * 0.01, f32::from(i % 3) * 0.01, 0.5]);
+        let ceiling = (0..20_u16).map(|i| [f32::from(i % 5) * 0.01, f32::from(i / 5) * 0.01 - 0.9, 2.8]);
+        let mut points: Vec<[f32; 3]> = edge(40).chain(ceiling).collect();
+        let (flat, patch) = (flat_fit(&points), fit(&mut points));
+        assert!(flat.spacing_m > 0.05, "{flat:?}");
+        assert!(patch.spacing_m < 0.04 && patch.thickness_m <= patch.spacing_m, "{patch:?}");
+        // A surface that is only rough keeps its roughness.
+        let mut rough = scattered(60, [0.1, 0.1, 0.05]);
+        let patch = fit(&mut rough);
+        assert!((0.007..0.02).contains(&patch.thickness_m), "{patch:?}");
     }
 
     #[test]
