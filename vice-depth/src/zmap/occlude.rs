@@ -33,6 +33,10 @@ const RELATIVE_TOLERANCE: f64 = 0.005;
 /// The same over the standard deviation across the surface.
 const NOISE_TOLERANCE: f64 = 3.0;
 
+/// The same over the distance between the points of the surface: how it runs between them is not known better. On a
+/// noisy scan this keeps the points behind the nearest ones, which are in front by chance.
+const SPACING_TOLERANCE: f64 = 2.0;
+
 /// How far a patch's plane is believed: its tilt against the rays is held at this many metres a metre.
 const MAX_TILT: f64 = 6.0;
 
@@ -125,7 +129,9 @@ impl<'a> Occlusion<'a> {
             return false;
         }
         let patch = self.view.patch(leaf);
-        seen.z_m > surface_m(&patch, seen.ray, z_m) + slack_m.max(NOISE_TOLERANCE * patch.thickness_m)
+        seen.z_m
+            > surface_m(&patch, seen.ray, z_m)
+                + slack_m.max(NOISE_TOLERANCE * patch.thickness_m).max(SPACING_TOLERANCE * patch.spacing_m)
     }
 }
 
