@@ -111,7 +111,7 @@ impl Registry {
 
 fn collection(path: &Path, format: &str, paths: &[PathBuf]) -> DataError {
     let first = paths.first().map_or_else(String::new, |p| p.display().to_string());
-    DataError::new(format!("this holds {} {format} data sets, not one", paths.len()))
+    DataError::new(format!("this is a folder of {format} data sets ({} of them), not one", paths.len()))
         .at(path)
         .hint(format!("name one of them, such as {first}; `vice info` lists them"))
 }
@@ -158,7 +158,7 @@ mod tests {
         assert!(open(vec![Claims("a", Probe::No)], None, &none).contains("no format recognises this"));
         assert!(open(two(), Some("c"), &none).contains("unknown format `c` (known: a, b)"));
         let many = Probe::Collection(vec![PathBuf::from("x"), PathBuf::from("y")]);
-        assert!(open(vec![Claims("a", many)], None, &none).contains("holds 2 a data sets"));
+        assert!(open(vec![Claims("a", many)], None, &none).contains("a folder of a data sets (2 of them)"));
         let set = OpenOptions { settings: [("k".to_string(), "v".to_string())].into() };
         assert!(open(two(), Some("a"), &set).contains("no setting `k`"));
         let gone = Registry::new().detect(Path::new("no/such")).err().unwrap();

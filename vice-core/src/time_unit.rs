@@ -26,6 +26,14 @@ pub fn suspect_unit(expected: (Stamp, Stamp), suspect: (Stamp, Stamp)) -> Option
     finer.map(|(read_as, _)| format!("nanoseconds read as {read_as}"))
 }
 
+/// Which of two ranges that should overlap has the wrong unit, in words: the one with the smaller numbers, since
+/// recordings are in nanoseconds.
+pub fn mixed_up(a: (&str, (Stamp, Stamp)), b: (&str, (Stamp, Stamp))) -> Option<String> {
+    let size = |(from, to): (Stamp, Stamp)| from.as_nanos().unsigned_abs().max(to.as_nanos().unsigned_abs());
+    let (suspect, expected) = if size(a.1) <= size(b.1) { (a, b) } else { (b, a) };
+    Some(format!("the {} look like {}", suspect.0, suspect_unit(expected.1, suspect.1)?))
+}
+
 /// The error of a file whose stamps have another unit than the expected range, with both ranges; `None` as for
 /// [`suspect_unit`].
 pub fn unit_mixup(expected: (Stamp, Stamp), suspect: (Stamp, Stamp)) -> Option<DataError> {

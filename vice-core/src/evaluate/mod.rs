@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-pub use select::{Selection, Window};
+pub use select::{SelectedKeyframe, Selection, Window};
 pub use streams::Stream;
 
 use crate::camera::{Camera, Pixel, ProjectError};
@@ -144,7 +144,7 @@ pub enum EvaluateError {
     },
     /// No label is at a frame.
     #[error("none of the labels is at a frame: labels {} to {} ns, frames {} to {} ns{}",
-        labels.0, labels.1, frames.0, frames.1, suspicion.as_ref().map_or_else(String::new, |s| format!(" (the labels look like {s})")))]
+        labels.0, labels.1, frames.0, frames.1, suspicion.as_ref().map_or_else(String::new, |s| format!(" ({s})")))]
     NoLabelAtFrame {
         /// First and last label.
         labels: (Stamp, Stamp),
@@ -154,8 +154,11 @@ pub enum EvaluateError {
         suspicion: Option<String>,
     },
     /// No labelled frame lies in the window.
-    #[error("no label with a key frame lies between --start and --start + --duration")]
+    #[error("no label lies in the part of the run that was asked for (see --start, --duration)")]
     EmptyWindow,
+    /// No point has a key frame.
+    #[error("no label is marked as a key frame, so that there is nothing to carry along")]
+    NoKeyframe,
     /// More points are asked for than there are.
     #[error("subsets of {asked} points were asked for, but there are {points} points")]
     SubsetTooLarge {
@@ -166,7 +169,7 @@ pub enum EvaluateError {
     },
     /// A stream has no pose within the evaluated frames.
     #[error("stream {stream} and the evaluated frames do not overlap in time: poses {} to {} ns, frames {} to {} ns{}",
-        poses.0, poses.1, frames.0, frames.1, suspicion.as_ref().map_or_else(String::new, |s| format!(" (the poses look like {s})")))]
+        poses.0, poses.1, frames.0, frames.1, suspicion.as_ref().map_or_else(String::new, |s| format!(" ({s})")))]
     NoOverlap {
         /// The stream.
         stream: String,
@@ -374,7 +377,7 @@ fn trajectory_parts(evaluation: &Evaluation<'_>) -> Vec<TrajectoryPart> {
     let Some(reference) = evaluation.streams.iter().find(|s| s.role == crate::result::Role::Reference) else {
         return vec![];
     };
-    let stamps: Vec<Stamp> = evaluation.selection.frames.iter().map(|f| evaluation.frames[*f]).collect();
+    let stamps: Vec<Stamp> = evaluation.selection.in_window.iter().map(|f| evaluation.frames[*f]).collect();
     evaluation
         .streams
         .iter()

@@ -7,7 +7,7 @@ use super::{EvaluateError, SkipReason};
 use crate::camera::Camera;
 use crate::label::{LabelSet, Observation};
 use crate::time::{Span, Stamp};
-use crate::time_unit::suspect_unit;
+use crate::time_unit::mixed_up;
 
 /// The part of a run that is evaluated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -48,6 +48,27 @@ pub struct Selection<'a> {
     pub(super) points: Vec<SelectedPoint<'a>>,
     /// Indices of frames with a key frame or a sample, ascending.
     pub(super) frames: Vec<usize>,
+    /// Those of them that lie in the window: a key frame before it says what a point is, no more.
+    pub(super) in_window: Vec<usize>,
+}
+
+/// A key frame that takes part, with the labels that are scored against it. Frames are indices.
+#[derive(Clone, Copy, Debug)]
+pub struct SelectedKeyframe<'s> {
+    /// Name of the point.
+    pub point: &'s str,
+    /// Its label at the key frame.
+    pub keyframe: &'s Observation,
+    /// The key frame.
+    pub frame: usize,
+    samples: &'s [Matched<'s>],
+}
+
+impl<'s> SelectedKeyframe<'s> {
+    /// The labels that are scored, and their frames.
+    pub fn samples(&self) -> impl Iterator<Item = (&'s Observation, usize)> + use<'s> {
+        self.samples.iter().map(|s| (s.observation, s.frame))
+    }
 }
 
 impl<'a> Selection<'a> {
@@ -72,7 +93,7 @@ impl<'a> Selection<'a> {
         }
         check_inside(labels, camera)?;
         let kept = KeptFrames::new(frames, window);
-        let mut selection = Self { points: Vec::new(), frames: Vec::new() };
+        let mut selection = Self { points: Vec::new(), frames: Vec::new(), in_window: Vec::new() };
         let mut used = BTreeSet::new();
         let mut at_a_frame = false;
         for point in labels.points() {
@@ -127,8 +148,10 @@ impl<'a> Selection<'a> {
         }
         selection.frames = used.into_iter().collect();
         if selection.frames.is_empty() {
-            return Err(EvaluateError::EmptyWindow);
+            let windowed = *window != Window::default();
+            return Err(if windowed { EvaluateError::EmptyWindow } else { EvaluateError::NoKeyframe });
         }
+        selection.in_window = selection.frames.iter().copied().filter(|f| kept.covers(frames[*f])).collect();
         Ok(selection)
     }
 
@@ -140,6 +163,18 @@ impl<'a> Selection<'a> {
     /// The first and last frame that takes part.
     pub fn stamp_range(&self, frames: &[Stamp]) -> Option<(Stamp, Stamp)> {
         Some((frames[*self.frames.first()?], frames[*self.frames.last()?]))
+    }
+
+    /// The key frames that take part, by point and in time.
+    pub fn keyframes(&self) -> impl Iterator<Item = SelectedKeyframe<'_>> {
+        self.points.iter().flat_map(|p| {
+            p.segments.iter().map(|s| SelectedKeyframe {
+                point: &p.name,
+                keyframe: s.keyframe.observation,
+                frame: s.keyframe.frame,
+                samples: &s.samples,
+            })
+        })
     }
 
     /// Number of points with a name, scored or not.
@@ -168,7 +203,7 @@ fn check_inside(labels: &LabelSet, camera: &Camera) -> Result<(), EvaluateError>
 fn no_label_at_a_frame(labels: &LabelSet, frames: (Stamp, Stamp)) -> EvaluateError {
     let stamps = || labels.points().iter().flat_map(|p| &p.observations).map(|o| o.stamp);
     let labels = (stamps().min().unwrap_or_default(), stamps().max().unwrap_or_default());
-    EvaluateError::NoLabelAtFrame { labels, frames, suspicion: suspect_unit(frames, labels) }
+    EvaluateError::NoLabelAtFrame { labels, frames, suspicion: mixed_up(("labels", labels), ("frames", frames)) }
 }
 
 /// The frames of the window.

@@ -7,7 +7,7 @@ use crate::metrics::associate::PosePairs;
 use crate::metrics::trajectory::Summary;
 use crate::result::{Role, TrajectoryPart};
 use crate::time::{Span, Stamp};
-use crate::time_unit::suspect_unit;
+use crate::time_unit::mixed_up;
 use crate::trajectory::{NoPose, Trajectory};
 
 /// A named pose stream that is evaluated or compared with.
@@ -34,7 +34,7 @@ impl Stream {
         if poses.0 <= frames.1 && frames.0 <= poses.1 {
             return Ok(());
         }
-        let suspicion = suspect_unit(frames, poses);
+        let suspicion = mixed_up(("poses", poses), ("frames", frames));
         Err(EvaluateError::NoOverlap { stream: self.name.clone(), poses, frames, suspicion })
     }
 }

@@ -262,6 +262,9 @@ fn a_window_keeps_its_key_frames() {
     assert_eq!((part.scored, part.keyframes.len()), (12, 4));
     assert!(part.keyframes.iter().all(|k| k.timestamp_ns == stamp(0)));
     assert!(part.pooled_rmse_px.unwrap() < 1e-7);
+    // The key frame before the window says what the points are; it is no frame of the window.
+    let both = [stream(Role::Reference, exact()), stream(Role::Estimate, exact())];
+    assert_eq!(run(&labels, &both, window).unwrap().trajectory[0].matched, 3);
 }
 
 #[test]
