@@ -2,10 +2,12 @@
 
 mod depth;
 mod open;
+mod outputs;
 mod streams;
 
 pub(crate) use depth::{AnchorArgs, DepthArgs, Scene};
 pub(crate) use open::{DatasetArgs, split_list};
+pub(crate) use outputs::Outputs;
 pub(crate) use streams::{StreamArgs, load_streams};
 
 use std::path::PathBuf;
@@ -28,10 +30,10 @@ pub(crate) struct LabelArgs {
     #[arg(long, value_name = "HZ", value_parser = positive)]
     pub(crate) fps: Option<f64>,
     /// Seconds after the camera's first frame.
-    #[arg(long, value_name = "S", default_value = "0", value_parser = span)]
+    #[arg(long, value_name = "S", default_value = "0", allow_hyphen_values = true, value_parser = span_not_negative)]
     pub(crate) start: Span,
     /// Seconds from there [default: to the end].
-    #[arg(long, value_name = "S", value_parser = span)]
+    #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = span_not_negative)]
     pub(crate) duration: Option<Span>,
 }
 

@@ -98,6 +98,10 @@ fn sample(record: &StringRecord) -> DataResult<ImuSample> {
     if record.len() < column::COUNT {
         return Err(DataError::new(format!("expected {} columns, found {}", column::COUNT, record.len())));
     }
+    // A row that was cut inside a quoted list would take the rest of the file with it.
+    if record.iter().any(|field| field.contains('\n')) {
+        return Err(DataError::new("a quote is not closed on its line").hint("is the row cut off?"));
+    }
     let whole = |at: usize, below: i64| {
         let text = record[at].trim();
         text.parse::<i64>().ok().filter(|v| (0..below).contains(v)).ok_or_else(|| {
@@ -197,6 +201,7 @@ mod tests {
             (row("1", "1000000000"), "line 3: column 6: `1000000000` is no part of a time stamp"),
             (row("1526182346246347174", "0"), "line 3: column 5"),
             (row("-1", "0"), "line 3: column 5"),
+            (row("1", "6").replace("0.0]\"\n", "\n") + &row("1", "7"), "line 3: a quote is not closed"),
             (row("2", "0").replace("0.2", "inf"), "line 3: column 16: `inf` is no finite number"),
         ] {
             let error = imu(&(good.clone() + &bad)).unwrap_err().to_string();

@@ -62,6 +62,13 @@ impl Matrix4 {
     }
 }
 
+/// Nothing but numbers, as NumPy writes a matrix.
+fn plain(text: &str) -> Option<Matrix4> {
+    let numbers = text.split(|c: char| c.is_whitespace() || c == ',').filter(|w| !w.is_empty());
+    let numbers: Result<Vec<f64>, _> = numbers.map(str::parse).collect();
+    Some(Matrix4::Flat(numbers.ok().filter(|n| !n.is_empty())?))
+}
+
 #[derive(Deserialize)]
 struct File {
     body_from_estimate: Option<Matrix4>,
@@ -76,6 +83,9 @@ struct File {
 pub fn read(path: impl AsRef<Path>) -> DataResult<Rigid<Body, Sensor>> {
     let path = path.as_ref();
     let text = yaml::read_text(path)?;
+    if let Some(matrix) = plain(&text) {
+        return matrix.to_rigid("the matrix").map_err(|e| e.at(path));
+    }
     let file: File =
         if is_toml(path) { from_toml(&text) } else { yaml::parse(&text) }.map_err(|e| e.at(path))?;
     let rigid = match (file.body_from_estimate, file.t_bs) {

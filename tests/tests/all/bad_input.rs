@@ -5,22 +5,18 @@ use std::path::{Path, PathBuf};
 
 use vice_tests::{Run, vice};
 
-const FRAMES: [i64; 5] = [
-    1403715280562142976,
-    1403715280612143104,
-    1403715280662142976,
-    1403715280712143104,
-    1403715280762142976,
-];
+const FRAMES: [i64; 5] =
+    [1403715280562142976, 1403715280612143104, 1403715280662142976, 1403715280712143104, 1403715280762142976];
 
 /// A small sequence in the EuRoC layout whose images are empty files: evaluating decodes none.
 struct Sequence {
     folder: tempfile::TempDir,
+    results: tempfile::TempDir,
 }
 
 impl Sequence {
     fn new() -> Self {
-        let s = Self { folder: tempfile::tempdir().unwrap() };
+        let s = Self { folder: tempfile::tempdir().unwrap(), results: tempfile::tempdir().unwrap() };
         fs::create_dir_all(s.path("mav0/cam0/data")).unwrap();
         fs::create_dir_all(s.path("mav0/state_groundtruth_estimate0")).unwrap();
         s.write("mav0/cam0/sensor.yaml", &sensor("458.654", "radial-tangential"));
@@ -39,6 +35,11 @@ impl Sequence {
         self.folder.path().join(relative)
     }
 
+    /// Where the result document goes: not into the data that is read.
+    fn document(&self) -> PathBuf {
+        self.results.path().join("out.json")
+    }
+
     fn write(&self, relative: &str, text: &str) {
         fs::write(self.path(relative), text).unwrap();
     }
@@ -46,11 +47,16 @@ impl Sequence {
     /// Evaluates with further options.
     fn evaluate(&self, more: &[&str]) -> Run {
         let text = |p: PathBuf| p.to_str().unwrap().to_string();
-        let mut args = vec!["evaluate".to_string(), text(self.path("")), "--labels".into(), text(self.path("labels.csv"))];
+        let mut args = vec![
+            "evaluate".to_string(),
+            text(self.path("")),
+            "--labels".into(),
+            text(self.path("labels.csv")),
+        ];
         if !more.contains(&"--estimate") {
             args.extend(["--estimate".to_string(), text(self.path("estimate.txt"))]);
         }
-        args.extend(["--json".to_string(), text(self.path("out.json"))]);
+        args.extend(["--json".to_string(), text(self.document())]);
         args.extend(more.iter().map(|m| (*m).to_string()));
         vice(&args)
     }
@@ -58,7 +64,7 @@ impl Sequence {
     /// It fails with one line that holds all the words, and leaves no document.
     fn fails(&self, more: &[&str], words: &[&str]) {
         refused(&self.evaluate(more), words);
-        assert!(!self.path("out.json").exists(), "a document was left");
+        assert!(!self.document().exists(), "a document was left");
     }
 }
 
@@ -110,7 +116,7 @@ fn the_sequence_itself_is_good() {
     let s = Sequence::new();
     let run = s.evaluate(&[]);
     assert_eq!(run.code, 0, "{}{}", run.stdout, run.stderr);
-    assert!(s.path("out.json").exists());
+    assert!(s.document().exists());
 }
 
 #[test]
@@ -239,11 +245,15 @@ fn options_that_do_not_fit() {
 fn skips_above_the_threshold_exit_with_3_and_are_all_listed() {
     let s = Sequence::new();
     // The camera of the anchor looks up: no key frame meets the floor.
-    s.write("mav0/state_groundtruth_estimate0/data.csv", &truth(1).replace(",1.0,0.0,0.0,0.0", ",0.0,1.0,0.0,0.0"));
+    s.write(
+        "mav0/state_groundtruth_estimate0/data.csv",
+        &truth(1).replace(",1.0,0.0,0.0,0.0", ",0.0,1.0,0.0,0.0"),
+    );
     let run = s.evaluate(&[]);
     assert_eq!(run.code, 3, "{}{}", run.stdout, run.stderr);
     assert!(run.stdout.contains("keyframe-above-horizon"), "{}", run.stdout);
-    let document: serde_json::Value = serde_json::from_str(&fs::read_to_string(s.path("out.json")).unwrap()).unwrap();
+    let document: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(s.document()).unwrap()).unwrap();
     for part in document["pixel"].as_array().unwrap() {
         assert_eq!(part["skipped"].as_array().unwrap().len(), 8);
         assert!(part["pooled_rmse_px"].is_null() && part["scored"] == 0);
@@ -259,7 +269,10 @@ fn nothing_is_overwritten_unasked() {
     let run = vice(&["synth".to_string(), path("")]);
     refused(&run, &["not empty"]);
     s.write("taken.csv", "mine");
-    refused(&vice(&["labels".to_string(), "convert".into(), path("labels.csv"), path("taken.csv")]), &["taken.csv", "--force"]);
+    refused(
+        &vice(&["labels".to_string(), "convert".into(), path("labels.csv"), path("taken.csv")]),
+        &["taken.csv", "--force"],
+    );
     assert_eq!(fs::read_to_string(s.path("taken.csv")).unwrap(), "mine");
     let refuse_name = vice(&["labels".to_string(), "convert".into(), path("labels.csv"), path("labels.txt")]);
     refused(&refuse_name, &["labels.txt"]);
@@ -267,11 +280,60 @@ fn nothing_is_overwritten_unasked() {
 }
 
 #[test]
+fn what_is_read_is_not_written_over() {
+    let s = Sequence::new();
+    let path = |p: &str| s.path(p).to_str().unwrap().to_string();
+    let before = fs::read_to_string(s.path("labels.csv")).unwrap();
+    refused(&s.evaluate(&["--csv", &path("labels.csv")]), &["labels.csv", "another file"]);
+    refused(&s.evaluate(&["--csv", &path("estimate.txt")]), &["estimate.txt"]);
+    refused(&s.evaluate(&["--csv", &path("mav0/new.csv")]), &["mav0/new.csv"]);
+    refused(&s.evaluate(&["--csv", "same.x", "--latex", "same.x"]), &["same.x", "two outputs"]);
+    assert_eq!(fs::read_to_string(s.path("labels.csv")).unwrap(), before);
+    assert!(!s.document().exists());
+}
+
+#[test]
+fn a_calibration_must_be_of_the_camera_and_its_images() {
+    let s = Sequence::new();
+    s.write("other.toml", "[cam5]\nintrinsics = [400.0, 400.0, 300.0, 200.0]\n");
+    s.write("size.toml", "[cam0]\nresolution = [700, 400]\n");
+    let path = |p: &str| s.path(p).to_str().unwrap().to_string();
+    s.fails(&["--calibration", &path("other.toml")], &["cam5", "cam0"]);
+    s.fails(&["--calibration", &path("size.toml")], &["700x400", "752x480"]);
+}
+
+#[test]
+fn chained_motions_alone_do_not_know_where_the_floor_is() {
+    let s = Sequence::new();
+    let second = |i: usize| format!("{}.{:09}", FRAMES[i] / 1_000_000_000, FRAMES[i] % 1_000_000_000);
+    let rows: String =
+        (1..5).map(|i| format!("{} {} -0.01 0 0 0 0 0 1\n", second(i - 1), second(i))).collect();
+    s.write("motions.txt", &rows);
+    let spec = format!("rel:{}", s.path("motions.txt").display());
+    s.fails(&["--estimate", &spec, "--reference", "none"], &["--initial-pose"]);
+    let placed = ["--estimate", &spec, "--reference", "none", "--initial-pose", "0,0,2,0,0,0,1"];
+    let run = s.evaluate(&placed);
+    assert_eq!(run.code, 0, "{}{}", run.stdout, run.stderr);
+}
+
+#[test]
 fn a_trajectory_without_a_match_says_both_ranges() {
     let s = Sequence::new();
     let path = |p: &str| s.path(p).to_str().unwrap().to_string();
     s.write("later.txt", &tum("").replace("1403715280.", "1403715999."));
-    refused(&vice(&["trajectory".to_string(), path("estimate.txt"), path("later.txt")]), &["1403715280.562142976", "1403715999.562142976"]);
-    refused(&vice(&["trajectory".to_string(), path("estimate.txt"), path("estimate.txt"), "--delta".into(), "0".into()]), &["delta"]);
+    refused(
+        &vice(&["trajectory".to_string(), path("estimate.txt"), path("later.txt")]),
+        &["1403715280.562142976", "1403715999.562142976"],
+    );
+    refused(
+        &vice(&[
+            "trajectory".to_string(),
+            path("estimate.txt"),
+            path("estimate.txt"),
+            "--delta".into(),
+            "0".into(),
+        ]),
+        &["delta"],
+    );
     assert!(Path::new(&path("later.txt")).exists());
 }

@@ -24,8 +24,7 @@ fn the_imu_integrates_as_scipy_does() {
     let poses = oracle["poses"].as_array().unwrap();
     let last = Stamp::from_nanos(poses.last().unwrap()["timestamp_ns"].as_i64().unwrap());
     assert!(last.since(start) >= Span::from_millis(5_900), "the oracle covers six seconds");
-    let integrated =
-        integrate_euler(&dataset.imu().unwrap(), &state, last, GRAVITY_Z_UP_M_S2).unwrap();
+    let integrated = integrate_euler(&dataset.imu().unwrap(), &state, last, GRAVITY_Z_UP_M_S2).unwrap();
     for pose in poses {
         let stamp = Stamp::from_nanos(pose["timestamp_ns"].as_i64().unwrap());
         let got = integrated.pose_at(stamp, Span::from_millis(6)).unwrap();

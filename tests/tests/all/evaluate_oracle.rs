@@ -15,7 +15,14 @@ fn evaluate(labels: &str, estimate: &str, depth: &str, more: &[&str]) -> Option<
         false => estimate.to_string(),
     };
     let mut args = vec!["evaluate".to_string(), path(&dataset), "--labels".into(), path(&labels)];
-    args.extend(["--estimate".into(), estimate, "--depth".into(), depth.into(), "--json".into(), path(&json)]);
+    args.extend([
+        "--estimate".into(),
+        estimate,
+        "--depth".into(),
+        depth.into(),
+        "--json".into(),
+        path(&json),
+    ]);
     args.extend(more.iter().map(|s| (*s).to_string()));
     let run = vice(&args);
     assert_eq!(run.code, 0, "{}", run.stderr);
@@ -80,7 +87,9 @@ fn zmap_depth_agrees_with_scipy() {
     let Some(oracle) = shared_json("oracle/euroc_v1_01_vice.json") else { return };
     let all = ["--subsets", "1,2,3,4", "--zmap-occlusion", "off"];
     for labels in ["floor", "board"] {
-        let Some(document) = evaluate(&format!("{labels}.csv"), "imu_euler.txt", "zmap", &all) else { return };
+        let Some(document) = evaluate(&format!("{labels}.csv"), "imu_euler.txt", "zmap", &all) else {
+            return;
+        };
         let oracle = &oracle[format!("labels_{labels}")];
         compare(part(&document, "reference", "zmap"), &oracle["ground_truth/zmap"], 1e-3, 1e-5);
         compare(part(&document, "estimate", "zmap"), &oracle["imu_euler/zmap"], 1e-3, 1e-5);

@@ -12,7 +12,7 @@ use vice_files::image_file::{encode_depth_png, encode_png};
 
 use crate::commands::depth_compare;
 use crate::inputs::{AnchorArgs, DatasetArgs, DepthArgs, Scene};
-use crate::report::depth_picture::{depth_picture, difference_picture};
+use crate::report::depth_picture::{common_range, depth_picture, difference_picture};
 use crate::report::{npy, table};
 use crate::terminal::{self, Outcome, Verbosity, usage};
 
@@ -94,6 +94,9 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
 }
 
 fn write_images(args: &ImageArgs, verbosity: Verbosity) -> anyhow::Result<Outcome> {
+    if args.out.is_file() {
+        return Err(usage(format!("--out: {} is a file, not a folder", args.out.display())));
+    }
     let scene = Scene::open(&args.dataset, &args.depth, &args.anchor)?;
     let frame = scene.frame_at(&args.at)?;
     let keyframe = scene.keyframe(frame)?;
@@ -103,6 +106,7 @@ fn write_images(args: &ImageArgs, verbosity: Verbosity) -> anyhow::Result<Outcom
     let mut files: Vec<(String, Vec<u8>)> = Vec::new();
     let mut grid = vec![["source", "answered", "median m", "not answered"].map(String::from).to_vec()];
     let mut maps: Vec<(String, DepthMap)> = Vec::new();
+    let mut images: Vec<(String, DepthImage)> = Vec::new();
     for source in &sources {
         let map = depth_image(source.as_ref(), &keyframe)?;
         if map.answered() == 0 {
@@ -117,11 +121,15 @@ fn write_images(args: &ImageArgs, verbosity: Verbosity) -> anyhow::Result<Outcom
             format!("{}.npy", source.name()),
             npy::encode_f32(image.height(), image.width(), image.z_m()),
         ));
-        files.push((format!("{}_picture.png", source.name()), encode_png(&depth_picture(&image)?)?));
         maps.push((source.name().to_string(), map));
+        images.push((source.name().to_string(), image));
         bar.inc(1);
     }
     bar.finish_and_clear();
+    let range_m = common_range(&images.iter().map(|(_, image)| image).collect::<Vec<_>>());
+    for (name, image) in &images {
+        files.push((format!("{name}_picture.png"), encode_png(&depth_picture(image, range_m)?)?));
+    }
     let mut text = table::align(&grid);
     for (i, (first, a)) in maps.iter().enumerate() {
         for (second, b) in &maps[i + 1..] {

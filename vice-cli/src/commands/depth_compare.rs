@@ -6,12 +6,12 @@ use anyhow::Context;
 use serde::Serialize;
 use vice_core::camera::Pixel;
 use vice_core::depth::{DepthMiss, DepthSample, DepthSource};
+use vice_core::evaluate::{SelectedKeyframe, Selection};
 use vice_core::frames::WorldFromCamera;
-use vice_core::label::Segment;
 use vice_core::time::Stamp;
 use vice_core::track::{lift, track};
 
-use crate::inputs::{AnchorArgs, DatasetArgs, DepthArgs, LabelArgs, Scene, write_text};
+use crate::inputs::{AnchorArgs, DatasetArgs, DepthArgs, LabelArgs, Outputs, Scene};
 use crate::report::table;
 use crate::terminal::{self, Outcome, printable, usage};
 
@@ -30,7 +30,7 @@ pub(crate) struct Args {
     depth: DepthArgs,
     #[command(flatten)]
     anchor: AnchorArgs,
-    /// The comparison as JSON, vice.depth-compare/1.
+    /// The comparison as JSON, vice.depth-compare/1; - prints it in place of the table.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -70,46 +70,34 @@ struct Cost {
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let outputs = Outputs::new(&[&args.json], &[args.dataset.path.clone(), args.labels.labels.clone()])?;
     let scene = Scene::open(&args.dataset, &args.depth, &args.anchor)?;
     let labels = args.labels.read(&scene.used.frames)?;
     let sources = args.depth.sources("--source", &args.source, &scene.dataset, &scene.used.name)?;
     if sources.len() < 2 {
         return Err(usage("--source: name two sources to compare, such as floor,zmap"));
     }
-    let mut key_points = Vec::new();
-    for point in labels.points() {
-        for segment in point.segments() {
-            let frame = scene.used.frames.binary_search(&segment.keyframe.stamp).ok();
-            let Some(frame) = frame else {
-                let stamp = segment.keyframe.stamp;
-                tracing::warn!(
-                    "key frame of point {} at {stamp} ns is no frame of the camera: left out",
-                    point.name
-                );
-                continue;
-            };
-            key_points.push(key_point(&scene, &sources, &point.name, &segment, frame)?);
-        }
-    }
-    anyhow::ensure!(!key_points.is_empty(), "{}: no key frame is at a frame", args.labels.labels.display());
+    let selection = Selection::new(&labels, &scene.used.frames, &scene.used.camera, &args.labels.window())
+        .with_context(|| args.labels.labels.display().to_string())?;
+    let key_points: Vec<KeyPoint> =
+        selection.keyframes().map(|k| key_point(&scene, &sources, &k)).collect::<anyhow::Result<_>>()?;
     let sources = sources.iter().map(|s| s.name().to_string()).collect();
     let document = Document { schema: "vice.depth-compare/1", sources, key_points };
-    if let Some(path) = &args.json {
-        write_text(path, &format!("{}\n", serde_json::to_string(&document)?))?;
+    let json =
+        args.json.as_ref().map(|path| anyhow::Ok((path, format!("{}\n", serde_json::to_string(&document)?))));
+    if !outputs.write(&json.into_iter().collect::<anyhow::Result<Vec<_>>>()?)? {
+        terminal::print(&render(&document))?;
     }
-    terminal::print(&render(&document))?;
     Ok(Outcome::Done)
 }
 
 fn key_point(
     scene: &Scene,
     sources: &[Box<dyn DepthSource>],
-    name: &str,
-    segment: &Segment<'_>,
-    frame: usize,
+    selected: &SelectedKeyframe<'_>,
 ) -> anyhow::Result<KeyPoint> {
-    let keyframe = scene.keyframe(frame)?;
-    let px = segment.keyframe.px;
+    let keyframe = scene.keyframe(selected.frame)?;
+    let px = selected.keyframe.px;
     let mut depths = Vec::new();
     for source in sources {
         let answer: Result<DepthSample, DepthMiss> =
@@ -124,15 +112,20 @@ fn key_point(
     if let (Some(z_m), Some(at_keyframe)) =
         (depths.iter().find_map(|d| d.depth_z_m), keyframe.world_from_camera)
     {
-        for later in segment.rest {
-            let Ok(index) = scene.used.frames.binary_search(&later.stamp) else { continue };
+        for (later, index) in selected.samples() {
             let Some(now) = scene.keyframe(index)?.world_from_camera else { continue };
             if let Some(px_per_mm) = px_per_mm(scene, px, z_m, &at_keyframe, &now) {
                 cost.push(Cost { timestamp_ns: later.stamp, px_per_mm });
             }
         }
     }
-    Ok(KeyPoint { point: name.to_string(), timestamp_ns: keyframe.stamp, label_px: px, depths, cost })
+    Ok(KeyPoint {
+        point: selected.point.to_string(),
+        timestamp_ns: keyframe.stamp,
+        label_px: px,
+        depths,
+        cost,
+    })
 }
 
 /// How far the carried point moves for a millimetre of depth, by a central difference.
@@ -174,7 +167,7 @@ fn render(document: &Document) -> String {
             document.key_points.iter().filter_map(|k| difference_mm(k, i)).map(f64::abs).collect();
         sizes.sort_unstable_by(f64::total_cmp);
         let answered = sizes.len();
-        let Some((median, largest)) = sizes.get(answered / 2).zip(sizes.last()) else {
+        let Some((median, largest)) = median_of(&sizes).zip(sizes.last()) else {
             summary.push_str(&format!("{source} and {} answer no key point together\n", document.sources[0]));
             continue;
         };
@@ -194,6 +187,12 @@ fn render(document: &Document) -> String {
     format!("{}\n{summary}", table::align(&grid))
 }
 
+/// The median of sorted values.
+fn median_of(sorted: &[f64]) -> Option<f64> {
+    let (low, high) = (sorted.get(sorted.len().checked_sub(1)? / 2)?, sorted.get(sorted.len() / 2)?);
+    Some(0.5 * (low + high))
+}
+
 fn difference_mm(k: &KeyPoint, source: usize) -> Option<f64> {
     Some((k.depths[source].depth_z_m? - k.depths[0].depth_z_m?) * 1000.0)
 }
@@ -205,4 +204,14 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 fn dash(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| "-".to_string(), |v| format!("{v:.decimals$}"))
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_median_of_an_even_count_is_between_its_middle_two() {
+        let median = |v: &[f64]| super::median_of(v);
+        assert_eq!((median(&[]), median(&[3.0]), median(&[1.0, 2.0])), (None, Some(3.0), Some(1.5)));
+        assert_eq!(median(&[7.4, 9.8, 11.5, 12.1, 13.5, 28.9, 34.3, 73.4]), Some(12.8));
+    }
 }

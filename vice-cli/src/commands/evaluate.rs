@@ -8,7 +8,9 @@ use vice_core::evaluate::{EvaluateError, Evaluation, Selection, evaluate};
 use vice_core::metrics::align::Alignment;
 use vice_core::result::{ResultDocument, Settings};
 
-use crate::inputs::{DatasetArgs, DepthArgs, LabelArgs, StreamArgs, load_streams, write_text};
+use vice_core::dataset::{Dataset, Floor};
+
+use crate::inputs::{DatasetArgs, DepthArgs, LabelArgs, Outputs, StreamArgs, load_streams, split_list};
 use crate::report;
 use crate::terminal::{self, Outcome, Verbosity, usage};
 
@@ -16,7 +18,7 @@ use crate::terminal::{self, Outcome, Verbosity, usage};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     vice evaluate V1_01_easy --labels floor.csv --estimate imu-euler,openvins.txt --depth floor,zmap\n  \
-    vice evaluate my_run --labels labels.json --estimate rel:odometry.txt --reference none --json out.json\n\n\
+    vice evaluate my_run --labels labels.json --estimate rel:odometry.txt --reference none --depth zcam --json out.json\n\n\
     Lists repeat the option or take commas. Estimates are names of the data set's streams, `imu-euler` (Euler\n\
     integration of its IMU from the reference state at the first key frame), or files: TUM, EuRoC CSV, KITTI with a\n\
     times file, and relative motions as rel:FILE.")]
@@ -60,7 +62,7 @@ struct OutputArgs {
     /// Which samples the JSON lists.
     #[arg(long, value_name = "all|none", default_value = "all", value_parser = ["all", "none"])]
     samples: String,
-    /// Result document, vice.result/1.
+    /// Result document, vice.result/1; - prints it in place of the table.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// The table as CSV.
@@ -79,6 +81,7 @@ fn percent(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
+    let outputs = Outputs::new(&[&args.output.json, &args.output.csv, &args.output.latex], &inputs(args))?;
     let document = document(args, verbosity)?;
     // All texts are made before the first is written, so that a failure leaves nothing half done.
     let json = args
@@ -95,10 +98,10 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         .as_ref()
         .map(|path| report::latex::render(&document).map(|t| (path, t)))
         .transpose()?;
-    for (path, text) in [json, csv, latex].into_iter().flatten() {
-        write_text(path, &text)?;
+    let texts: Vec<(&PathBuf, String)> = [json, csv, latex].into_iter().flatten().collect();
+    if !outputs.write(&texts)? {
+        terminal::print(&report::table::render(&document))?;
     }
-    terminal::print(&report::table::render(&document))?;
     let worst = document.worst_skipped_percent();
     if worst > args.scoring.max_skipped {
         verbosity.note(&format!(
@@ -121,7 +124,15 @@ fn document(args: &Args, verbosity: Verbosity) -> anyhow::Result<ResultDocument>
     let floor = args.depth_options.floor()?;
     let dataset = args.dataset.open()?;
     let used = args.dataset.used_camera(dataset.as_ref(), calibration.as_ref())?;
+    tracing::info!(
+        "{} ({}): camera {} with {} frames",
+        dataset.name(),
+        dataset.format(),
+        used.name,
+        used.frames.len()
+    );
     let labels = args.labels.read(&used.frames)?;
+    tracing::info!("{} points with {} labels", labels.points().len(), labels.observation_count());
     let window = args.labels.window();
     let in_labels = |error: EvaluateError| match error {
         EvaluateError::Data(error) => anyhow::Error::new(error),
@@ -133,7 +144,13 @@ fn document(args: &Args, verbosity: Verbosity) -> anyhow::Result<ResultDocument>
         let points = selection.point_count();
         return Err(usage(EvaluateError::SubsetTooLarge { asked: *asked, points }.to_string()));
     }
-    let streams = load_streams(&args.streams, dataset.as_ref(), &used, &selection, calibration.as_ref())?;
+    let world_depth = asks_for_the_world(args, dataset.as_ref(), &selection)?;
+    let streams =
+        load_streams(&args.streams, dataset.as_ref(), &used, &selection, calibration.as_ref(), world_depth)?;
+    for stream in &streams.list {
+        let t = &stream.trajectory;
+        tracing::info!("stream {}: {} poses, {} to {} ns", stream.name, t.len(), t.start(), t.end());
+    }
     let sources = args.depth_options.sources("--depth", &args.depth, &dataset, &used.name)?;
     let sources: Vec<&dyn DepthSource> = sources.iter().map(AsRef::as_ref).collect();
     let settings = Settings {
@@ -178,10 +195,37 @@ fn document(args: &Args, verbosity: Verbosity) -> anyhow::Result<ResultDocument>
     Ok(document)
 }
 
+/// Whether a depth source needs the camera's place in the world: a depth camera and a floor under the body do not.
+fn asks_for_the_world(args: &Args, dataset: &dyn Dataset, selection: &Selection<'_>) -> anyhow::Result<bool> {
+    let names = split_list(&args.depth);
+    let floor_in_world = || -> anyhow::Result<bool> {
+        let Some(stamp) = selection.first_keyframe() else { return Ok(true) };
+        Ok(args.depth_options.floor_plane.is_some() || matches!(dataset.floor(stamp)?, Floor::World(_)))
+    };
+    if names.iter().any(|n| n == "zmap" || n == "mesh") {
+        return Ok(true);
+    }
+    Ok((names.is_empty() || names.iter().any(|n| n == "floor")) && floor_in_world()?)
+}
+
 /// Options that have no field of their own in the document.
 fn other_settings(args: &Args) -> std::collections::BTreeMap<String, String> {
     let mut other: std::collections::BTreeMap<String, String> =
         args.dataset.settings.iter().map(|(key, value)| (format!("set {key}"), value.clone())).collect();
+    other.insert("estimate".to_string(), split_list(&args.streams.estimate).join(","));
+    if let Some(reference) = &args.streams.reference {
+        other.insert("reference".to_string(), reference.clone());
+    }
+    if let Some(times) = &args.streams.times {
+        other.insert("times".to_string(), times.display().to_string());
+    }
+    if let Some(pose) = &args.streams.initial_pose {
+        other.insert("initial-pose".to_string(), pose.map(|v| v.to_string()).join(","));
+    }
+    if !args.scoring.subsets.is_empty() {
+        let sizes: Vec<String> = args.scoring.subsets.iter().map(u16::to_string).collect();
+        other.insert("subsets".to_string(), sizes.join(","));
+    }
     if let Some(voxel_m) = args.depth_options.cloud_voxel {
         other.insert("cloud-voxel".to_string(), voxel_m.to_string());
     }
@@ -189,4 +233,14 @@ fn other_settings(args: &Args) -> std::collections::BTreeMap<String, String> {
         other.insert("zcam-range".to_string(), format!("{near},{far}"));
     }
     other
+}
+
+/// What is read, and so must not be written over: files, and the whole data set.
+fn inputs(args: &Args) -> Vec<PathBuf> {
+    let mut inputs = vec![args.dataset.path.clone(), args.labels.labels.clone()];
+    let specs = split_list(&args.streams.estimate).into_iter().chain(args.streams.reference.clone());
+    inputs.extend(specs.map(|spec| PathBuf::from(spec.strip_prefix("rel:").unwrap_or(&spec))));
+    inputs.extend(args.streams.times.iter().chain(&args.depth_options.calibration).cloned());
+    inputs.push(PathBuf::from(&args.streams.estimate_frame));
+    inputs
 }

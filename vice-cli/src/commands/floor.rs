@@ -7,6 +7,9 @@ use vice_depth::{FloorFit, FloorFitOptions, fit_floor_to_cloud, fit_floor_to_dep
 use crate::inputs::{AnchorArgs, DatasetArgs, DepthArgs, Scene, positive};
 use crate::terminal::{self, Outcome, Verbosity};
 
+/// A plane with less of the points than this is worth a warning.
+const SMALL_SHARE: f64 = 0.05;
+
 /// What to do with the floor.
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Command {
@@ -30,7 +33,7 @@ pub(crate) struct FitArgs {
     #[arg(long, value_name = "M", default_value = "0.02", value_parser = positive)]
     tolerance: f64,
     /// How far from level the floor may be, degrees.
-    #[arg(long, value_name = "DEGREES", default_value = "15", value_parser = positive)]
+    #[arg(long, value_name = "DEGREES", default_value = "15", value_parser = tilt)]
     max_tilt: f64,
     #[command(flatten)]
     depth: DepthArgs,
@@ -67,15 +70,30 @@ fn fit(args: &FitArgs, verbosity: Verbosity) -> anyhow::Result<Outcome> {
                 .dataset
                 .depth_image(&scene.used.name, frame)?
                 .with_context(|| format!("frame {frame} has no depth image"))?;
+            anyhow::ensure!(
+                image.z_m().iter().any(|z| z.is_finite()),
+                "the depth image of frame {frame} has no valid depth"
+            );
             let world_from_camera = keyframe.world_from_camera.with_context(|| {
                 format!("the camera's place at {} ns is unknown (name a --reference)", keyframe.stamp)
             })?;
             fit_floor_to_depth_image(&image, &scene.used.camera, &world_from_camera, up, &options)?
         }
     };
+    let share = found.inliers as f64 / found.points as f64;
+    if share < SMALL_SHARE {
+        tracing::warn!(
+            "only {:.1} % of the points are of this plane: it may not be the floor",
+            100.0 * share
+        );
+    }
     terminal::print(&render(&found))?;
     verbosity.note("use it with --floor-plane");
     Ok(Outcome::Done)
+}
+
+fn tilt(text: &str) -> Result<f64, String> {
+    positive(text).and_then(|v| if v <= 90.0 { Ok(v) } else { Err("must be at most 90".to_string()) })
 }
 
 fn render(fit: &FloorFit) -> String {

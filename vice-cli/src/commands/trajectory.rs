@@ -11,9 +11,9 @@ use vice_core::metrics::rpe::{Delta, DeltaUnit, PairMode, PairsFrom, Rpe, RpeErr
 use vice_core::metrics::trajectory::{Ape, ApeErrors, Statistics, Summary};
 use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
-use vice_files::trajectory::{ReadOptions, read_spec};
+use vice_files::trajectory::{ReadOptions, TrajectoryFormat, read_spec};
 
-use crate::inputs::{span, span_not_negative, write_text};
+use crate::inputs::{Outputs, span, span_not_negative};
 use crate::report::table;
 use crate::terminal::{self, Outcome, usage};
 
@@ -72,7 +72,7 @@ pub(crate) struct Args {
     /// Times of KITTI files [default: times.txt beside each].
     #[arg(long, value_name = "FILE")]
     times: Option<PathBuf>,
-    /// Result document, vice.trajectory/1.
+    /// Result document, vice.trajectory/1; - prints it in place of the table.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -106,7 +106,10 @@ struct RpePart {
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let delta = Delta::new(args.delta, args.delta_unit).map_err(|e| usage(format!("--delta: {e}")))?;
-    let (reference, estimate) = (read(args, &args.reference)?, read(args, &args.estimate)?);
+    let read_files =
+        [&args.reference, &args.estimate].map(|s| PathBuf::from(s.strip_prefix("rel:").unwrap_or(s)));
+    let outputs = Outputs::new(&[&args.json], &read_files)?;
+    let (reference, estimate) = read_both(args)?;
     // As evo: what the reference no longer has is not matched either.
     let reference = crop(&reference, args.t_start, args.t_end).with_context(|| args.reference.clone())?;
     let matching = match args.interpolate {
@@ -150,16 +153,27 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         rpe,
         rpe_problem,
     };
-    if let Some(path) = &args.json {
-        write_text(path, &format!("{}\n", serde_json::to_string(&document)?))?;
+    let json =
+        args.json.as_ref().map(|path| anyhow::Ok((path, format!("{}\n", serde_json::to_string(&document)?))));
+    if !outputs.write(&json.into_iter().collect::<anyhow::Result<Vec<_>>>()?)? {
+        terminal::print(&render(&document, estimate.len()))?;
     }
-    terminal::print(&render(&document, estimate.len()))?;
     Ok(Outcome::Done)
 }
 
-fn read(args: &Args, spec: &str) -> anyhow::Result<Trajectory> {
-    let options = ReadOptions { times: args.times.clone(), index_as_seconds: true };
-    Ok(read_spec(spec, &options)?.trajectory)
+/// Two KITTI files without times are compared row by row; one alone has no clock to compare by.
+fn read_both(args: &Args) -> anyhow::Result<(Trajectory, Trajectory)> {
+    let read = |spec: &str, index_as_seconds| {
+        read_spec(spec, &ReadOptions { times: args.times.clone(), index_as_seconds })
+    };
+    let (mut reference, mut estimate) = (read(&args.reference, true)?, read(&args.estimate, true)?);
+    match (reference.format, estimate.format) {
+        (TrajectoryFormat::Kitti, TrajectoryFormat::Kitti) => {}
+        (TrajectoryFormat::Kitti, _) => reference = read(&args.reference, false)?,
+        (_, TrajectoryFormat::Kitti) => estimate = read(&args.estimate, false)?,
+        _ => {}
+    }
+    Ok((reference.trajectory, estimate.trajectory))
 }
 
 fn stamp(text: &str) -> Result<Stamp, String> {

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use vice_core::dataset::{Dataset, GROUND_TRUTH};
 use vice_core::evaluate::{Selection, Stream};
 use vice_core::frames::{Body, BodyFromCamera, Rigid, Sensor, WorldFromBody, WorldFromCamera};
-use vice_core::imu::{GRAVITY_Z_UP_M_S2, InertialState, fit_velocity, integrate_euler};
+use vice_core::imu::{GRAVITY_Z_UP_M_S2, ImuSample, InertialState, fit_velocity, integrate_euler};
 use vice_core::metrics::associate::{Matching, PosePairs};
 use vice_core::metrics::rotation_offset::RotationOffset;
 use vice_core::result::Role;
@@ -67,15 +67,14 @@ pub(crate) fn load_streams(
     used: &UsedCamera,
     selection: &Selection<'_>,
     calibration: Option<&CalibrationFile>,
+    world_depth: bool,
 ) -> anyhow::Result<LoadedStreams> {
     let time_offset = args.time_offset.or(calibration.and_then(|c| c.time_offset)).unwrap_or(Span::ZERO);
-    let mut loader = Loader { args, dataset, used, selection, reference: None };
+    let mut loader = Loader { args, dataset, used, selection, time_offset, world_depth, reference: None };
     loader.reference = loader.load_reference()?;
     let mut list: Vec<Stream> = loader.reference.iter().cloned().collect();
     for name in split_list(&args.estimate) {
         let trajectory = loader.estimate(&name)?;
-        let trajectory =
-            trajectory.shifted(time_offset).with_context(|| format!("{name} with --time-offset"))?;
         let stream = Stream { name: stream_name(&name, &list), role: Role::Estimate, trajectory };
         if let (Some(reference), false) = (&loader.reference, name == IMU_EULER) {
             warn_of_rotation(reference, &stream, args.max_gap);
@@ -94,6 +93,9 @@ struct Loader<'a> {
     dataset: &'a dyn Dataset,
     used: &'a UsedCamera,
     selection: &'a Selection<'a>,
+    time_offset: Span,
+    /// Whether a depth source asks where the camera is in the world.
+    world_depth: bool,
     reference: Option<Stream>,
 }
 
@@ -114,14 +116,14 @@ impl Loader<'_> {
     }
 
     fn estimate(&self, name: &str) -> anyhow::Result<Trajectory> {
-        if self.is_stream(name) {
-            return Ok(self.dataset.trajectory(name)?);
-        }
-        if name == IMU_EULER {
+        if name == IMU_EULER && !self.is_stream(name) {
             return self.imu_euler();
         }
-        let trajectory = self.file(name, "--estimate")?;
-        self.to_body(trajectory)
+        let trajectory = match self.is_stream(name) {
+            true => self.dataset.trajectory(name)?,
+            false => self.to_body(self.file(name, "--estimate")?)?,
+        };
+        trajectory.shifted(self.time_offset).with_context(|| format!("{name} with --time-offset"))
     }
 
     fn is_stream(&self, name: &str) -> bool {
@@ -181,6 +183,10 @@ impl Loader<'_> {
         let (_, last) =
             self.selection.stamp_range(&self.used.frames).context("there is no frame to integrate to")?;
         let state = self.start_state(reference, start)?;
+        // The clock of the samples is what is off: shifted afterwards, the states would miss the key frame.
+        let shifted = |s: &ImuSample| ImuSample { stamp: s.stamp + self.time_offset, ..*s };
+        let samples: Vec<ImuSample> = samples.iter().map(shifted).collect();
+        warn_of_gap(&samples, start, last, self.args.max_gap);
         // A little beyond, so that the last frame lies between two states.
         let end = last + Span::from_millis(1000);
         integrate_euler(&samples, &state, end, GRAVITY_Z_UP_M_S2)
@@ -206,6 +212,24 @@ impl Loader<'_> {
         })
     }
 
+    /// An estimate that places the camera by itself must know where the floor is. Chained motions start anywhere.
+    fn check_own_world(&self) -> anyhow::Result<()> {
+        let spec = split_list(&self.args.estimate).into_iter().next().unwrap_or_default();
+        if !self.world_depth {
+            return Ok(());
+        }
+        if spec.starts_with("rel:") {
+            return Err(usage(format!(
+                "{spec} places the camera for depth, but relative motions have no place in the world: give --initial-pose \
+                 (or --depth zcam)"
+            )));
+        }
+        tracing::warn!(
+            "{spec} itself places the camera for depth: the floor or cloud must be in its world (else give --initial-pose)"
+        );
+        Ok(())
+    }
+
     /// Which stream places the camera; an initial pose moves its world.
     fn anchor(&self, list: &mut [Stream]) -> anyhow::Result<usize> {
         let has_reference = self.reference.is_some();
@@ -218,7 +242,12 @@ impl Loader<'_> {
             Some("estimate") => usize::from(has_reference),
             _ => 0,
         };
-        let Some([x, y, z, qx, qy, qz, qw]) = self.args.initial_pose else { return Ok(anchor) };
+        let Some([x, y, z, qx, qy, qz, qw]) = self.args.initial_pose else {
+            if list[anchor].role == Role::Estimate {
+                self.check_own_world()?;
+            }
+            return Ok(anchor);
+        };
         if list[anchor].role == Role::Reference {
             return Err(usage(
                 "--initial-pose places an estimate: it needs --anchor estimate or --reference none",
@@ -247,6 +276,17 @@ fn stream_name(spec: &str, taken: &[Stream]) -> String {
         .map(|n| if n == 1 { stem.to_string() } else { format!("{stem}-{n}") })
         .find(|name| !is_taken(name))
         .unwrap_or_else(|| stem.to_string())
+}
+
+/// A sample is held across a gap, which no robot does.
+fn warn_of_gap(samples: &[ImuSample], start: Stamp, end: Stamp, max_gap: Span) {
+    let gaps = samples.windows(2).map(|w| (w[0].stamp, w[1].stamp.since(w[0].stamp)));
+    let inside = gaps.filter(|(at, gap)| *gap > max_gap && *at + *gap > start && *at < end);
+    if let Some((at, gap)) = inside.max_by_key(|(_, gap)| *gap) {
+        tracing::warn!(
+            "{IMU_EULER}: the inertial samples have a gap of {gap} after {at} ns; a sample is held across it"
+        );
+    }
 }
 
 /// A constant rotation between the bodies is never corrected, but said.

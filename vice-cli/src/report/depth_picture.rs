@@ -46,24 +46,36 @@ fn at(map: &[Colour], fraction: f64) -> Colour {
     })
 }
 
-/// A depth image in colour, from its 1st to its 99th percentile, near things dark.
-pub(crate) fn depth_picture(depth: &DepthImage) -> DataResult<Image> {
-    let (low, high) = percentile_range(depth.z_m());
-    paint(depth.width(), depth.height(), depth.z_m(), (low, high), &CIVIDIS, false)
+/// The depths that pictures of one frame go from and to, metres: so that sources can be held side by side, and wide
+/// enough for the 1st to the 99th percentile of the source that sees least far. A floor runs to the horizon.
+pub(crate) fn common_range(images: &[&DepthImage]) -> (f64, f64) {
+    let ranges = images.iter().map(|i| percentile_range(i.z_m()));
+    let (low, high) =
+        ranges.fold((f64::INFINITY, f64::INFINITY), |(l, h), (low, high)| (l.min(low), h.min(high)));
+    if high > low { (low, high) } else { (low, low + 1e-3) }
 }
 
-/// Differences in metres in colour, symmetric about zero up to the 99th percentile of their size.
+/// A depth image in colour between two depths, near things dark.
+pub(crate) fn depth_picture(depth: &DepthImage, range_m: (f64, f64)) -> DataResult<Image> {
+    paint(depth.width(), depth.height(), depth.z_m(), range_m, &CIVIDIS, false)
+}
+
+/// Differences in metres in colour, symmetric about zero up to the 99th percentile of their size, or four times their
+/// median where that is less.
 pub(crate) fn difference_picture(width: u32, height: u32, metres: &[f32]) -> DataResult<Image> {
     let sizes: Vec<f32> = metres.iter().map(|v| v.abs()).collect();
     let (_, high) = percentile_range(&sizes);
     paint(width, height, metres, (-high, high), &DIVERGING, true)
 }
 
+/// The 1st and the 99th percentile of what is finite; the upper one at most four times the median, with room for
+/// values that are nearly all alike.
 fn percentile_range(values: &[f32]) -> (f64, f64) {
     let mut finite: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
     finite.sort_unstable_by(f32::total_cmp);
     let pick = |p: f64| finite.get(((finite.len().saturating_sub(1)) as f64 * p).round() as usize).copied();
-    let (low, high) = (f64::from(pick(0.01).unwrap_or(0.0)), f64::from(pick(0.99).unwrap_or(1.0)));
+    let at = |p: f64, otherwise: f32| f64::from(pick(p).unwrap_or(otherwise));
+    let (low, high) = (at(0.01, 0.0), at(0.99, 1.0).min((4.0 * at(0.5, 1.0)).max(1e-3)));
     if high > low { (low, high) } else { (low, low + 1e-3) }
 }
 
@@ -119,7 +131,7 @@ mod tests {
         let mut z: Vec<f32> = (0..100 * 60).map(|i| 1.0 + i as f32 / 6000.0).collect();
         z[0] = f32::NAN;
         let depth = DepthImage::new(Stamp::default(), 100, 60, z).unwrap();
-        let picture = depth_picture(&depth).unwrap();
+        let picture = depth_picture(&depth, common_range(&[&depth])).unwrap();
         assert_eq!((picture.width(), picture.height()), (190, 60));
         let sum = |column: usize, row: usize| -> u32 {
             picture.data()[3 * (row * 190 + column)..][..3].iter().map(|c| u32::from(*c)).sum()
@@ -135,7 +147,7 @@ mod tests {
     #[test]
     fn no_depth_at_all_is_a_picture_too() {
         let depth = DepthImage::new(Stamp::default(), 20, 30, vec![f32::NAN; 600]).unwrap();
-        assert!(depth_picture(&depth).is_ok());
+        assert!(depth_picture(&depth, common_range(&[&depth])).is_ok());
         assert!(difference_picture(20, 30, &[0.0; 600]).is_ok());
     }
 }

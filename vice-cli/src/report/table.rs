@@ -33,6 +33,11 @@ pub(crate) fn render(document: &ResultDocument) -> String {
     }
     let mut text = heading(document);
     text.push_str(&align(&grid));
+    for part in &document.trajectory {
+        if let Some(problem) = &part.problem {
+            text.push_str(&format!("no RMSE_3D of {}: {}\n", printable(&part.estimate), printable(problem)));
+        }
+    }
     text.push('\n');
     text.push_str(&pooled(document));
     text

@@ -154,6 +154,13 @@ impl CameraOverride {
         let missing = |what: &str| DataError::new(format!("{what} is missing, and the data set has none"));
         let [width, height] =
             self.resolution.or(base.map(|b| [b.width(), b.height()])).ok_or_else(|| missing("resolution"))?;
+        if let Some(base) = base.filter(|b| (b.width(), b.height()) != (width, height)) {
+            return Err(DataError::new(format!(
+                "the calibration is of {width}x{height} images, the data set's have {}x{}",
+                base.width(),
+                base.height()
+            )));
+        }
         let intrinsics =
             self.intrinsics.or(base.map(Camera::fx_fy_cx_cy)).ok_or_else(|| missing("intrinsics"))?;
         let model = match (&self.model, &self.distortion, base.map(Camera::model)) {

@@ -99,9 +99,6 @@ impl Columns {
             return Err(DataError::new("the file is empty").hint(expected));
         }
         let known = ["point", "timestamp_ns", "u_px", "v_px", "keyframe", "source", "flags"];
-        for name in heading.iter().filter(|name| !known.contains(name)) {
-            tracing::warn!("labels: column `{name}` is not known and passed over");
-        }
         let find = |name: &str| heading.iter().position(|column| column == name);
         let required = |name: &str| {
             find(name).ok_or_else(|| DataError::new(format!("the column {name} is missing")).hint(expected))
@@ -109,7 +106,7 @@ impl Columns {
         if let Some(twice) = known.iter().find(|n| heading.iter().filter(|c| c == *n).count() > 1) {
             return Err(DataError::new(format!("the column {twice} appears twice")));
         }
-        Ok(Self {
+        let columns = Self {
             point: required("point")?,
             timestamp_ns: required("timestamp_ns")?,
             u_px: required("u_px")?,
@@ -117,7 +114,11 @@ impl Columns {
             keyframe: required("keyframe")?,
             source: find("source"),
             flags: find("flags"),
-        })
+        };
+        for name in heading.iter().filter(|name| !known.contains(name)) {
+            tracing::warn!("labels: column `{name}` is not known and passed over");
+        }
+        Ok(columns)
     }
 
     fn row(&self, record: &csv::StringRecord, line: u64) -> DataResult<LabelRow> {
