@@ -25,6 +25,7 @@ use vice_core::frames::{self, Rigid, World};
 use crate::cloud::Cloud;
 use interpolate::{Limits, Local, Surface};
 use occlude::Occlusion;
+use queries::Queries;
 use select::{Seen, View, Window};
 
 /// More pixels than this are answered by triangulating the whole image.
@@ -161,8 +162,12 @@ impl DepthSource for ZMapDepth {
             wanted = open;
         }
         if !wanted.is_empty() {
-            let surface = Surface::new(self.points(&view, &region), self.limits(&view))?;
-            surface.fill(pixels, &wanted, &mut out);
+            // The triangulation is one thread's work.
+            let (surface, queries) = rayon::join(
+                || Surface::new(self.points(&view, &region), self.limits(&view)),
+                || Queries::new(pixels, &wanted),
+            );
+            surface?.fill(&queries, &mut out);
         }
         Ok(out)
     }
