@@ -1,7 +1,7 @@
 //! Reading PLY files beside reading their bytes; plyfile is timed by `../shared/bench/peers.py --only ply`.
 //!
 //! `VICE_BENCH_POINTS` sets the size of the binary file, by default five million points.
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)] // A benchmark that cannot run may stop.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::print_stderr)] // A benchmark that cannot run may stop.
 
 use std::fmt::Write as _;
 use std::path::Path;

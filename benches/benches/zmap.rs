@@ -1,7 +1,7 @@
 //! Z-map depth: of the EuRoC cloud beside SciPy (`../shared/bench/peers.py --only zmap`), and of a large scan.
 //!
 //! `VICE_BENCH_POINTS` sets the size of the large scan, by default five million points.
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)] // A benchmark that cannot run may stop.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::print_stderr)] // A benchmark that cannot run may stop.
 
 use std::hint::black_box;
 use std::sync::Arc;

@@ -203,7 +203,11 @@ fn check_inside(labels: &LabelSet, camera: &Camera) -> Result<(), EvaluateError>
 fn no_label_at_a_frame(labels: &LabelSet, frames: (Stamp, Stamp)) -> EvaluateError {
     let stamps = || labels.points().iter().flat_map(|p| &p.observations).map(|o| o.stamp);
     let labels = (stamps().min().unwrap_or_default(), stamps().max().unwrap_or_default());
-    EvaluateError::NoLabelAtFrame { labels, frames, suspicion: mixed_up(("labels", labels), ("frames", frames)) }
+    EvaluateError::NoLabelAtFrame {
+        labels,
+        frames,
+        suspicion: mixed_up(("labels", labels), ("frames", frames)),
+    }
 }
 
 /// The frames of the window.
