@@ -186,7 +186,7 @@ fn gaps_are_counted_with_their_reason_and_a_gap_at_a_key_frame_skips_its_segment
     );
     assert_eq!(at_keyframe.keyframes.len(), 4);
 
-    let ends = &parts(without(&|i| i < 2 || i > 30))[1];
+    let ends = &parts(without(&|i| !(2..=30).contains(&i)))[1];
     let reasons: Vec<_> = ends.skips_by_reason().into_iter().collect();
     assert_eq!(reasons, [("after-stream", 36), ("keyframe-gap", 76)]);
 
