@@ -4,14 +4,19 @@
 
 use std::fs::read_to_string;
 use std::path::Path;
+use std::sync::Arc;
 
 use vice_core::camera::{Camera, Model, Pixel};
-use vice_core::dataset::{Floor, Plane};
+use vice_core::dataset::{Dataset, Floor, Plane};
 use vice_core::depth::{DepthSource, Keyframe};
 use vice_core::frames::{BodyFromCamera, Rigid};
 use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::{PoseRow, Trajectory};
-use vice_depth::{Cloud, CloudOptions, FloorDepth, ZMapDepth, ZMapOptions};
+use vice_depth::{
+    Cloud, CloudOptions, FloorDepth, FloorFitOptions, ZCamDepth, ZCamOptions, ZMapDepth, ZMapOptions,
+    depth_image, fit_floor_to_cloud, load_cloud,
+};
+use vice_synthetic::{CAMERA, Synthetic, SyntheticOptions};
 
 /// The numbers of `cam0/sensor.yaml`.
 fn camera() -> (Camera, BodyFromCamera) {
@@ -90,4 +95,71 @@ fn floor_and_zmap_agree_with_opencv_and_scipy() {
         let (worst, count) = compare(&zmap, &mav0, &oracle[labels]["ground_truth/zmap"]);
         assert!(count >= 4 && worst < 1e-5, "{labels}: {count} key points, worst {worst:e} m");
     }
+}
+
+/// A key frame of the rendered flight.
+fn rendered<'a>(flight: &Synthetic, camera: &'a Camera, frame: usize) -> Keyframe<'a> {
+    let stamp = flight.frames(CAMERA).unwrap()[frame];
+    Keyframe {
+        stamp,
+        frame,
+        camera,
+        body_from_camera: flight.body_from_camera(CAMERA, stamp).unwrap(),
+        world_from_camera: Some(flight.world_from_camera(frame)),
+        floor: flight.floor(stamp).unwrap(),
+    }
+}
+
+/// Parts of the pixels of some frames that a source answers, and of these within 2 cm of the exact depth.
+fn shares(flight: &Synthetic, source: &dyn DepthSource, frames: &[usize]) -> (f64, f64) {
+    let camera = flight.camera(CAMERA).unwrap();
+    let (mut asked, mut answered, mut good) = (0, 0, 0);
+    for frame in frames {
+        let keyframe = rendered(flight, &camera, *frame);
+        let exact = flight.depth_image(CAMERA, *frame).unwrap().unwrap();
+        let map = depth_image(source, &keyframe).unwrap();
+        for (got, exact) in map.pixels().iter().zip(exact.z_m()) {
+            asked += 1;
+            let Ok(got) = got else { continue };
+            answered += 1;
+            good += usize::from((got.z_m - f64::from(*exact)).abs() < 0.02);
+        }
+    }
+    (f64::from(answered) / f64::from(asked), good as f64 / f64::from(answered))
+}
+
+#[test]
+fn depth_on_the_rendered_flight_is_exact_where_it_is_given() {
+    let flight = Arc::new(Synthetic::new(SyntheticOptions::default()).unwrap());
+    let frames = [0, 40, 90, 140, 199];
+    let cloud = flight.cloud().unwrap().unwrap();
+    let scan = load_cloud(&cloud, &CloudOptions::default()).unwrap();
+    let zmap = |occlusion| {
+        let options = ZMapOptions { occlusion, ..ZMapOptions::default() };
+        ZMapDepth::new(Arc::clone(&scan), cloud.world_from_cloud, options)
+    };
+    let (answered, good) = shares(&flight, &zmap(true), &frames);
+    eprintln!("occlusion on: {answered:.4} answered, {good:.4} of these within 2 cm");
+    assert!(answered >= 0.9 && good >= 0.99);
+    let (answered, good) = shares(&flight, &zmap(false), &frames);
+    eprintln!("occlusion off: {answered:.4} answered, {good:.4} of these within 2 cm");
+    assert!(answered >= 0.9 && good < 0.95);
+
+    let zcam = ZCamDepth::new(flight.clone(), CAMERA, ZCamOptions::default()).unwrap();
+    let (answered, good) = shares(&flight, &zcam, &frames);
+    assert!(answered == 1.0 && good == 1.0, "z-camera: {answered} answered, {good} of these within 2 cm");
+
+    // The floor is where the exact depth and the floor's own agree; a box or wall in front of it is nearer.
+    let camera = flight.camera(CAMERA).unwrap();
+    let keyframe = rendered(&flight, &camera, 0);
+    let floor = depth_image(&FloorDepth::new(), &keyframe).unwrap();
+    let exact = flight.depth_image(CAMERA, 0).unwrap().unwrap();
+    let off = floor.pixels().iter().zip(exact.z_m()).filter_map(|(f, e)| Some(f.ok()?.z_m - f64::from(*e)));
+    let off: Vec<f64> = off.collect();
+    let on_floor = off.iter().filter(|d| d.abs() < 1e-5).count();
+    assert!(off.iter().all(|d| *d > -1e-5) && on_floor * 4 > off.len(), "{on_floor} of {}", off.len());
+
+    let up = nalgebra::Vector3::z_axis();
+    let fit = fit_floor_to_cloud(&scan, &cloud.world_from_cloud, up, &FloorFitOptions::default()).unwrap();
+    assert!(fit.plane.normal().z > 1.0 - 1e-6 && fit.plane.d_m().abs() < 1e-3, "{fit:?}");
 }
