@@ -1,5 +1,5 @@
-//! Depth from a scan of the scene, in three steps that can be seen apart: [`select`] what is in view, drop what is
-//! hidden ([`occlude`]), [`interpolate`] the rest.
+//! Depth from a scan of the scene, in three steps that can be seen apart: select what is in view, drop what is
+//! hidden (occlude), interpolate the rest.
 //!
 //! A few pixels are answered by their neighbourhoods: a window around each is grown until the triangle around the
 //! pixel cannot change any more, which gives the very number that the whole image would. Many pixels, such as a depth
