@@ -1,6 +1,6 @@
 //! Reads a scan of many points from a file, indexes it, asks it for a key frame, and says what that took.
 //!
-//! usage: large_scan [POINTS] (50,000,000 by default; the file is written to a temporary folder first)
+//! usage: `large_scan [POINTS]` (50,000,000 by default; the file is written to a temporary folder first)
 #![allow(clippy::print_stdout)]
 
 use std::error::Error;
