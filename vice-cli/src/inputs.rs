@@ -95,6 +95,13 @@ pub(crate) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     values.try_into().map_err(|_| format!("{N} numbers separated by commas are expected, got {got}"))
 }
 
+/// A document as one line of JSON.
+pub(crate) fn to_json(document: &impl serde::Serialize) -> anyhow::Result<String> {
+    let mut text = serde_json::to_string(document).context("cannot make the JSON")?;
+    text.push('\n');
+    Ok(text)
+}
+
 /// Writes a document beside and renames it.
 pub(crate) fn write_text(path: &std::path::Path, text: &str) -> anyhow::Result<()> {
     vice_files::atomic::write(path, vice_files::atomic::Overwrite::Replace, |out| {

@@ -56,7 +56,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     text.push_str(&in_words(&document)?);
     if let Some(out) = &args.out {
         let json = out.join("result.json");
-        crate::inputs::write_text(&json, &format!("{}\n", serde_json::to_string(&document)?))?;
+        crate::inputs::write_text(&json, &crate::inputs::to_json(&document)?)?;
         let picture = out.join("overlay.png");
         let bytes = draw(&flight, &document)?;
         vice_files::atomic::write(&picture, vice_files::atomic::Overwrite::Replace, |w| w.write_all(&bytes))?;

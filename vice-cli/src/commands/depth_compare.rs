@@ -11,7 +11,7 @@ use vice_core::frames::WorldFromCamera;
 use vice_core::time::Stamp;
 use vice_core::track::{lift, track};
 
-use crate::inputs::{AnchorArgs, DatasetArgs, DepthArgs, LabelArgs, Outputs, Scene};
+use crate::inputs::{AnchorArgs, DatasetArgs, DepthArgs, LabelArgs, Outputs, Scene, to_json};
 use crate::report::table;
 use crate::terminal::{self, Outcome, printable, usage};
 
@@ -83,8 +83,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         selection.keyframes().map(|k| key_point(&scene, &sources, &k)).collect::<anyhow::Result<_>>()?;
     let sources = sources.iter().map(|s| s.name().to_string()).collect();
     let document = Document { schema: "vice.depth-compare/1", sources, key_points };
-    let json =
-        args.json.as_ref().map(|path| anyhow::Ok((path, format!("{}\n", serde_json::to_string(&document)?))));
+    let json = args.json.as_ref().map(|path| anyhow::Ok((path, to_json(&document)?)));
     if !outputs.write(&json.into_iter().collect::<anyhow::Result<Vec<_>>>()?)? {
         terminal::print(&render(&document))?;
     }

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
 use vice_core::depth::DepthSource;
 use vice_core::evaluate::{EvaluateError, Evaluation, Selection, evaluate};
 use vice_core::metrics::align::Alignment;
@@ -10,7 +9,9 @@ use vice_core::result::{ResultDocument, Settings};
 
 use vice_core::dataset::{Dataset, Floor};
 
-use crate::inputs::{DatasetArgs, DepthArgs, LabelArgs, Outputs, StreamArgs, load_streams, split_list};
+use crate::inputs::{
+    DatasetArgs, DepthArgs, LabelArgs, Outputs, StreamArgs, load_streams, split_list, to_json,
+};
 use crate::report;
 use crate::terminal::{self, Outcome, Verbosity, usage};
 
@@ -111,12 +112,6 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         return Ok(Outcome::TooManySkips);
     }
     Ok(Outcome::Done)
-}
-
-fn to_json(document: &ResultDocument) -> anyhow::Result<String> {
-    let mut text = serde_json::to_string(document).context("cannot make the JSON")?;
-    text.push('\n');
-    Ok(text)
 }
 
 fn document(args: &Args, verbosity: Verbosity) -> anyhow::Result<ResultDocument> {

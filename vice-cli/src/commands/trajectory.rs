@@ -13,7 +13,7 @@ use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
 use vice_files::trajectory::{ReadOptions, TrajectoryFormat, read_spec};
 
-use crate::inputs::{Outputs, span, span_not_negative};
+use crate::inputs::{Outputs, span, span_not_negative, to_json};
 use crate::report::table;
 use crate::terminal::{self, Outcome, usage};
 
@@ -153,8 +153,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         rpe,
         rpe_problem,
     };
-    let json =
-        args.json.as_ref().map(|path| anyhow::Ok((path, format!("{}\n", serde_json::to_string(&document)?))));
+    let json = args.json.as_ref().map(|path| anyhow::Ok((path, to_json(&document)?)));
     if !outputs.write(&json.into_iter().collect::<anyhow::Result<Vec<_>>>()?)? {
         terminal::print(&render(&document, estimate.len()))?;
     }
