@@ -1,0 +1,5 @@
+//! Labels in minutes: a point is placed once, the image tracker carries it through the flight, and a person corrects
+//! what it doubts.
+#![forbid(unsafe_code)]
+
+pub mod tracker;
