@@ -1,0 +1,150 @@
+// The page's parts that need no browser.
+
+import assert from "node:assert/strict";
+import { afterEach, beforeEach, test } from "node:test";
+
+/** @import {Observation, State} from "../../vice-annotate/page/types.js" */
+
+Object.assign(globalThis, { location: { search: "?token=secret" } });
+const { View } = await import("../../vice-annotate/page/view.js");
+const { Labels } = await import("../../vice-annotate/page/labels.js");
+const { Keys, nameOf } = await import("../../vice-annotate/page/keys.js");
+const { Images } = await import("../../vice-annotate/page/images.js");
+
+/**
+ * @param {number} frame
+ * @param {Partial<Observation>} [rest]
+ * @returns {Observation}
+ */
+function seen(frame, rest = {}) {
+  return { frame, stamp_ns: `${frame}00`, u: 100, v: 100, source: "auto", keyframe: false, occluded: false, uncertain: false, confidence: 0.9, seeded: false, ...rest };
+}
+
+/** @param {Observation[]} observations @returns {State} */
+function state(observations) {
+  return {
+    revision: 7, dataset: "flight", format: "euroc", camera: "cam0", width: 640, height: 480, labels_file: "my.json",
+    writable: true, read_only_reason: null, frames: Array.from({ length: 10 }, (_, at) => ({ frame: 2 * at, stamp_ns: `${at}`, time_s: at / 10 })),
+    points: [{ name: "1", observations }], can_undo: false, can_redo: false, floor_suggestions: false, streams: [], jobs: [], version: "0",
+  };
+}
+
+test("an image's corner is half a pixel from the centre of its first pixel", () => {
+  const view = new View();
+  view.resize(640, 480);
+  view.setImage(320, 240);
+  assert.deepEqual(view.toScreen({ u: -0.5, v: -0.5 }), { x: 0, y: 0 });
+  assert.deepEqual(view.toScreen({ u: 0, v: 0 }), { x: 1, y: 1 });
+});
+
+test("what lies under the pointer stays there while zooming, and comes back as the same pixel", () => {
+  const view = new View();
+  view.resize(900, 500);
+  view.setImage(752, 480);
+  const before = view.toImage(333, 222);
+  view.zoomAt(3.7, 333, 222);
+  const after = view.toImage(333, 222);
+  assert.ok(Math.hypot(after.u - before.u, after.v - before.v) < 1e-9);
+  const { x, y } = view.toScreen({ u: 12.3, v: 45.6 });
+  const again = view.toImage(x, y);
+  assert.ok(Math.hypot(again.u - 12.3, again.v - 45.6) < 1e-9);
+  view.pan(1e6, -1e6);
+  assert.ok(view.holds(view.toImage(view.width - 1, 1)), "the image cannot be pushed out of sight");
+});
+
+test("a change is applied once and in order", () => {
+  const labels = new Labels(state([seen(0)]));
+  const change = { revision: 8, points: [{ name: "2", observations: [seen(4)] }], removed: ["1"], can_undo: true, can_redo: false, by: "edit", label: "" };
+  assert.equal(labels.apply({ ...change, revision: 9 }), "missed");
+  assert.deepEqual(labels.names, ["1"]);
+  assert.equal(labels.apply(change), "applied");
+  assert.deepEqual(labels.names, ["2"]);
+  assert.equal(labels.at("1", 0), null);
+  assert.equal(labels.at("2", 4)?.u, 100);
+  assert.equal(labels.apply(change), "known");
+});
+
+test("doubtful frames are found in both directions, whichever lane they are in", () => {
+  const labels = new Labels(state([seen(2, { confidence: 0.3 }), seen(4), seen(8, { uncertain: true, confidence: null })]));
+  assert.deepEqual(labels.doubtfulFrom(1, 1), { place: 4, name: "1" });
+  assert.deepEqual(labels.doubtfulFrom(4, -1), { place: 1, name: "1" });
+  assert.equal(labels.doubtfulFrom(4, 1), null);
+  assert.equal(labels.doubtfulCount, 2);
+});
+
+test("a respawn is offered after a lane that ended at the border, and not after one that ended inside", () => {
+  assert.deepEqual(new Labels(state([seen(2, { u: 637 })])).goneAt(6), ["1"]);
+  assert.deepEqual(new Labels(state([seen(2, { u: 637 })])).goneAt(2), []);
+  assert.deepEqual(new Labels(state([seen(2, { u: 300 })])).goneAt(6), []);
+  assert.deepEqual(new Labels(state([seen(2, { u: 637 }), seen(8)])).goneAt(6), []);
+});
+
+test("a correction tracks again up to the next observation by hand", () => {
+  const labels = new Labels(state([seen(0), seen(2), seen(4), seen(6, { source: "manual" }), seen(8)]));
+  assert.equal(labels.nextManual("1", 2)?.frame, 6);
+  assert.equal(labels.followedByAutomatic("1", 2), true);
+  assert.equal(labels.followedByAutomatic("1", 4), false);
+  assert.equal(labels.followedByAutomatic("1", 6), true);
+});
+
+test("keys are named alike on all keyboards, and a key given away is lost to its last owner", () => {
+  /** @type {any} */
+  const press = { key: "Z", ctrlKey: true, shiftKey: true, altKey: false, metaKey: false };
+  assert.equal(nameOf(press), "ctrl+shift+z");
+  assert.equal(nameOf({ ...press, key: "?", ctrlKey: false }), "?");
+  assert.equal(nameOf({ ...press, key: " ", ctrlKey: false, shiftKey: false }), "space");
+  assert.equal(nameOf({ ...press, key: "ArrowLeft", ctrlKey: false }), "shift+arrowleft");
+  const keys = new Keys({ respawn: ["q"] });
+  assert.equal(keys.actionOf("q"), "respawn");
+  assert.equal(keys.actionOf("e"), "next-frame");
+  keys.set("respawn", "e");
+  assert.equal(keys.actionOf("e"), "respawn");
+  assert.equal(keys.actionOf("pagedown"), "next-frame");
+  keys.reset();
+  assert.equal(keys.actionOf("e"), "next-frame");
+});
+
+test("no two actions share a default key", () => {
+  const all = new Keys().bindings.flatMap(({ keys }) => keys);
+  assert.equal(new Set(all).size, all.length);
+});
+
+/** @type {number} */
+let open;
+const real = { fetch: globalThis.fetch };
+beforeEach(() => {
+  open = 0;
+  Object.assign(globalThis, {
+    fetch: async (/** @type {string} */ path) => path.endsWith("/13")
+      ? new Response(JSON.stringify({ error: "cut short", hint: "copy it again" }), { status: 422 })
+      : new Response("bytes"),
+    createImageBitmap: async () => {
+      open += 1;
+      return { width: 10, height: 10, close: () => (open -= 1) };
+    },
+  });
+});
+afterEach(() => {
+  Object.assign(globalThis, real);
+});
+
+test("decoded frames stay within their bytes, the ones used last are kept", async () => {
+  const images = new Images(10 * 400);
+  for (let frame = 20; frame < 120; frame += 1) {
+    await images.get(frame);
+    await images.get(20);
+  }
+  assert.equal(images.bytes, 4000);
+  assert.equal(open, 10);
+  assert.ok(images.peek(20)?.bitmap);
+  assert.ok(images.peek(119)?.bitmap);
+  assert.equal(images.peek(60), null);
+});
+
+test("a frame that cannot be decoded says why, and is not asked for again", async () => {
+  const images = new Images(4000);
+  const picture = await images.get(13);
+  assert.equal(picture.bitmap, null);
+  assert.equal(picture.error, "cut short (copy it again)");
+  assert.equal(images.peek(13), picture);
+});

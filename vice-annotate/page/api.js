@@ -1,0 +1,155 @@
+// The server, as functions. Every request carries the token that stands in the page's address.
+
+/** @import {Change, Direction, Edit, Job, Projections, State, Suggestion} from "./types.js" */
+
+const token = new URLSearchParams(location.search).get("token") ?? "";
+
+/** An answer that is no success: one clear line, and perhaps what to do. */
+export class ServerError extends Error {
+  /**
+   * @param {number} status 0 where no answer came
+   * @param {string} message
+   * @param {string} hint
+   */
+  constructor(status, message, hint) {
+    super(message);
+    this.status = status;
+    this.hint = hint;
+  }
+}
+
+/**
+ * @param {string} path
+ * @param {RequestInit} [init]
+ * @returns {Promise<Response>}
+ */
+async function send(path, init = {}) {
+  const headers = new Headers(init.headers);
+  headers.set("Authorization", `Bearer ${token}`);
+  let response;
+  try {
+    response = await fetch(path, { ...init, headers });
+  } catch (cause) {
+    if (cause instanceof DOMException && cause.name === "AbortError") throw cause;
+    throw new ServerError(0, "the server does not answer", "is `vice annotate` still running?");
+  }
+  if (response.ok) return response;
+  /** @type {{error?: unknown, hint?: unknown}} */
+  const body = await response.json().catch(() => ({}));
+  const line = typeof body.error === "string" ? body.error : `the server answers ${response.status}`;
+  throw new ServerError(response.status, line, typeof body.hint === "string" ? body.hint : "");
+}
+
+/**
+ * @param {string} path
+ * @param {unknown} body
+ * @returns {Promise<any>}
+ */
+async function post(path, body) {
+  const response = await send(path, {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify(body),
+  });
+  return response.json();
+}
+
+/** @returns {Promise<State>} */
+export async function getState() {
+  return (await send("/api/state", { cache: "no-store" })).json();
+}
+
+/**
+ * The stored image of a frame.
+ * @param {number} frame
+ * @param {AbortSignal} [signal]
+ * @returns {Promise<Blob>}
+ */
+export async function getFrame(frame, signal) {
+  return (await send(`/api/frames/${frame}`, { signal })).blob();
+}
+
+/** @returns {Promise<Projections | null>} */
+export async function getProjections() {
+  return (await send("/api/projections", { cache: "no-store" })).json();
+}
+
+/**
+ * @param {number} frame
+ * @param {number} count
+ * @returns {Promise<Suggestion[]>}
+ */
+export async function getSuggestions(frame, count) {
+  const response = await send(`/api/suggestions?frame=${frame}&count=${count}`, { cache: "no-store" });
+  return (await response.json()).suggestions;
+}
+
+/**
+ * @param {number} revision the state that the edits were made on
+ * @param {Edit[]} edits one step of undo
+ * @returns {Promise<Change>}
+ */
+export function postEdits(revision, edits) {
+  return post("/api/edits", { revision, edits });
+}
+
+/**
+ * @param {"undo" | "redo"} which
+ * @param {number} revision
+ * @returns {Promise<Change>}
+ */
+export function postHistory(which, revision) {
+  return post(`/api/${which}`, { revision });
+}
+
+/**
+ * @param {number} revision
+ * @param {{points: string[], frame: number, direction: Direction, until: number | null}} request
+ * @returns {Promise<Job>}
+ */
+export function postTrack(revision, request) {
+  return post("/api/track", { revision, ...request });
+}
+
+/** @param {number | string} job */
+export async function stopTrack(job) {
+  await send(`/api/track/${encodeURIComponent(job)}`, { method: "DELETE", headers: { "Content-Type": "application/json" } });
+}
+
+/**
+ * @param {"json" | "csv" | "cvat"} format
+ * @returns {string} an address that downloads the labels
+ */
+export function exportAddress(format) {
+  return `/api/export?format=${format}&token=${encodeURIComponent(token)}`;
+}
+
+/**
+ * @param {string} format
+ * @param {{content: string, encoding: "text" | "base64", replace: boolean}} body
+ * @returns {Promise<Change>}
+ */
+export function postImport(format, body) {
+  return post(`/api/import?format=${format}`, body);
+}
+
+/**
+ * Follows what other windows and running jobs do.
+ * @param {{change: (change: Change) => void, job: (job: Job) => void, closed: () => void, lost: () => void,
+ *   open: () => void}} on
+ */
+export function follow(on) {
+  const events = new EventSource(`/api/events?token=${encodeURIComponent(token)}`);
+  events.addEventListener("open", () => on.open());
+  events.addEventListener("change", (event) => on.change(JSON.parse(event.data)));
+  events.addEventListener("job", (event) => on.job(JSON.parse(event.data)));
+  events.addEventListener("closed", () => {
+    events.close();
+    on.closed();
+  });
+  events.addEventListener("error", () => {
+    on.lost();
+    // A stream that was refused (a new token after a restart) is not tried again by the browser.
+    if (events.readyState === EventSource.CLOSED) on.closed();
+  });
+}

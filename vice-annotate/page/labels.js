@@ -1,0 +1,251 @@
+// The labels as the server last said, and questions about them. Everything that changes them comes through here.
+
+/** @import {Change, Dot, Edit, Job, Observation, Pixel, Point, Projections, State} from "./types.js" */
+
+const DOUBT_BELOW = 0.5;
+/** How near the border, as a part of the image's width, a point is taken to have left the image. */
+const BORDER = 0.04;
+
+export class Labels {
+  /** @param {State} state */
+  constructor(state) {
+    /** @type {State} */
+    this.state = state;
+    /** @type {Map<string, Map<number, Observation>>} point, then frame */
+    this.lanes = new Map();
+    /** @type {Map<number, number>} frame to its place among the frames */
+    this.places = new Map();
+    /** @type {Projections | null} */
+    this.projections = null;
+    /** @type {Map<number, Dot[]>} by frame */
+    this.dots = new Map();
+    /** The number of doubtful frames, and the revision it was counted at. */
+    this.counted = 0;
+    this.countedAt = -1;
+    /** @type {Map<string, Pixel>} shown before the server has said yes; by point and frame */
+    this.hopes = new Map();
+    this.replace(state);
+  }
+
+  /** @param {State} state */
+  replace(state) {
+    this.state = state;
+    this.places = new Map(state.frames.map((each, place) => [each.frame, place]));
+    this.lanes = new Map();
+    for (const point of state.points) this.#index(point);
+    this.hopes.clear();
+    this.countedAt = -1;
+  }
+
+  /** @param {Point} point */
+  #index(point) {
+    this.lanes.set(point.name, new Map(point.observations.map((each) => [each.frame, each])));
+  }
+
+  /**
+   * @param {Change} change
+   * @returns {"applied" | "known" | "missed"} `missed`: another change came before it, so the state must be read again
+   */
+  apply(change) {
+    if (change.revision <= this.state.revision) return "known";
+    if (change.revision > this.state.revision + 1) return "missed";
+    const { state } = this;
+    state.revision = change.revision;
+    state.can_undo = change.can_undo;
+    state.can_redo = change.can_redo;
+    state.points = state.points.filter((each) => !change.removed.includes(each.name));
+    for (const name of change.removed) this.lanes.delete(name);
+    for (const point of change.points) {
+      const at = state.points.findIndex((each) => each.name === point.name);
+      if (at < 0) state.points.push(point);
+      else state.points[at] = point;
+      this.#index(point);
+    }
+    state.points.sort((a, b) => a.name.localeCompare(b.name, "en", { numeric: true }));
+    this.hopes.clear();
+    return "applied";
+  }
+
+  /** @param {Projections | null} projections */
+  setProjections(projections) {
+    this.projections = projections;
+    this.dots = new Map();
+    for (const dot of projections?.dots ?? []) {
+      const there = this.dots.get(dot.frame);
+      if (there) there.push(dot);
+      else this.dots.set(dot.frame, [dot]);
+    }
+  }
+
+  /**
+   * @param {number} frame
+   * @returns {Dot[]}
+   */
+  dotsAt(frame) {
+    return this.dots.get(frame) ?? [];
+  }
+
+  /** @param {Job} job */
+  applyJob(job) {
+    const { jobs } = this.state;
+    const at = jobs.findIndex((each) => each.id === job.id);
+    if (at >= 0) jobs.splice(at, 1);
+    if (job.state === "running") jobs.push(job);
+  }
+
+  /** @returns {Job[]} */
+  get running() {
+    return this.state.jobs.filter((each) => each.state === "running");
+  }
+
+  get names() {
+    return this.state.points.map((each) => each.name);
+  }
+
+  /** @param {string} name */
+  indexOf(name) {
+    return this.state.points.findIndex((each) => each.name === name);
+  }
+
+  /**
+   * @param {string} name
+   * @param {number} frame
+   * @returns {Observation | null}
+   */
+  at(name, frame) {
+    return this.lanes.get(name)?.get(frame) ?? null;
+  }
+
+  /**
+   * Where the point is shown: as hoped, else as the server said.
+   * @param {string} name
+   * @param {number} frame
+   * @returns {Pixel | null}
+   */
+  pixel(name, frame) {
+    return this.hopes.get(`${frame} ${name}`) ?? this.at(name, frame);
+  }
+
+  /**
+   * @param {string} name
+   * @param {number} frame
+   * @param {Pixel | null} pixel
+   */
+  hope(name, frame, pixel) {
+    if (pixel) this.hopes.set(`${frame} ${name}`, pixel);
+    else this.hopes.delete(`${frame} ${name}`);
+  }
+
+  /** @param {Observation} observation */
+  doubtful(observation) {
+    const { uncertain, confidence } = observation;
+    return uncertain || (confidence !== null && confidence < (this.state.doubt_below ?? DOUBT_BELOW));
+  }
+
+  /** @returns {string} a name that no point has: the smallest free number */
+  freeName() {
+    let number = 1;
+    while (this.lanes.has(String(number))) number += 1;
+    return String(number);
+  }
+
+  /**
+   * The last observation of a point in or before a frame.
+   * @param {string} name
+   * @param {number} frame
+   * @returns {Observation | null}
+   */
+  lastUpTo(name, frame) {
+    let last = null;
+    for (const each of this.#observations(name)) {
+      if (each.frame > frame) break;
+      last = each;
+    }
+    return last;
+  }
+
+  /**
+   * @param {string} name
+   * @param {number} frame
+   * @returns {Observation | null} the next one by hand after a frame
+   */
+  nextManual(name, frame) {
+    return this.#observations(name).find((each) => each.frame > frame && each.source === "manual") ?? null;
+  }
+
+  /**
+   * @param {string} name
+   * @param {number} frame
+   * @returns {boolean} whether a correction here has automatic observations after it, up to the next one by hand
+   */
+  followedByAutomatic(name, frame) {
+    const until = this.nextManual(name, frame)?.frame ?? Infinity;
+    return this.#observations(name).some(
+      (each) => each.frame > frame && each.frame < until && each.source !== "manual" && each.source !== "detected",
+    );
+  }
+
+  /** @param {string} name */
+  #observations(name) {
+    return this.state.points.find((each) => each.name === name)?.observations ?? [];
+  }
+
+  /**
+   * Points whose lane ended for good before this frame, near the image's border.
+   * @param {number} frame
+   * @returns {string[]}
+   */
+  goneAt(frame) {
+    const { width, height } = this.state;
+    const margin = Math.max(8, width * BORDER);
+    return this.names.filter((name) => {
+      const last = this.lastUpTo(name, frame);
+      if (!last || last.frame === frame || last !== this.#observations(name).at(-1)) return false;
+      const { u, v } = last;
+      return u < margin || v < margin || u > width - 1 - margin || v > height - 1 - margin;
+    });
+  }
+
+  /**
+   * The nearest frame before or after, not itself, with a doubtful observation.
+   * @param {number} place among the frames
+   * @param {1 | -1} step
+   * @returns {{place: number, name: string} | null}
+   */
+  doubtfulFrom(place, step) {
+    const { frames, points } = this.state;
+    for (let at = place + step; at >= 0 && at < frames.length; at += step) {
+      for (const { name } of points) {
+        const observation = this.at(name, frames[at].frame);
+        if (observation && this.doubtful(observation)) return { place: at, name };
+      }
+    }
+    return null;
+  }
+
+  /** @returns {number} frames with a doubtful observation */
+  get doubtfulCount() {
+    if (this.countedAt === this.state.revision) return this.counted;
+    const frames = new Set();
+    for (const { observations } of this.state.points) {
+      for (const each of observations) if (this.doubtful(each)) frames.add(each.frame);
+    }
+    this.countedAt = this.state.revision;
+    this.counted = frames.size;
+    return this.counted;
+  }
+
+  /**
+   * What edits would overwrite, as text to compare before a second try.
+   * @param {Edit[]} edits
+   * @returns {string}
+   */
+  touchedBy(edits) {
+    return JSON.stringify(
+      edits.map((edit) => {
+        if (edit.op === "place" || edit.op === "mark" || edit.op === "delete") return this.at(edit.point, edit.frame);
+        return this.#observations(edit.point);
+      }),
+    );
+  }
+}

@@ -1,0 +1,233 @@
+// Writes to the server: one after the other, each on the revision that the user saw. A write that came too late is
+// refused by the server; then the state is read again and the user is told.
+
+/** @import {Change, Direction, Edit, Job} from "./types.js" */
+/** @import {Labels} from "./labels.js" */
+
+import { follow, getProjections, getState, postEdits, postHistory, postImport, postTrack, ServerError, stopTrack } from "./api.js";
+
+const STALE = 409;
+const PROJECTIONS_AFTER_MS = 250;
+
+/**
+ * @typedef {object} Listener
+ * @property {() => void} changed labels, jobs or projections
+ * @property {(kind: "info" | "warning" | "error", text: string) => void} tell
+ * @property {(change: Change) => void} elsewhere another window changed the labels
+ * @property {(job: Job) => void} finished
+ * @property {(state: "open" | "lost" | "closed") => void} connection
+ */
+
+export class Session {
+  /**
+   * @param {Labels} labels
+   * @param {Listener} listener
+   */
+  constructor(labels, listener) {
+    this.labels = labels;
+    this.listener = listener;
+    /** @type {Promise<unknown>} */
+    this.last = Promise.resolve();
+    this.pending = 0;
+    this.projectionsTimer = 0;
+  }
+
+  start() {
+    let opened = false;
+    follow({
+      change: (change) => this.#heard(change),
+      job: (job) => {
+        this.labels.applyJob(job);
+        this.listener.changed();
+        if (job.state !== "running") this.listener.finished(job);
+      },
+      closed: () => this.listener.connection("closed"),
+      lost: () => this.listener.connection("lost"),
+      open: () => {
+        this.listener.connection("open");
+        if (opened) this.reload();
+        opened = true;
+      },
+    });
+    this.#refreshProjections();
+  }
+
+  /** @param {Change} change */
+  #heard(change) {
+    // While a write of our own is under way its answer may be overtaken by its event: they are told apart in turn.
+    this.#queue(async () => {
+      const known = this.#apply(change);
+      if (known === "missed") await this.reload();
+      if (known !== "known" && change.by !== "track") this.listener.elsewhere(change);
+    });
+  }
+
+  /** @param {Change} change */
+  #apply(change) {
+    const result = this.labels.apply(change);
+    if (result === "applied") {
+      this.listener.changed();
+      this.#refreshProjections();
+    }
+    return result;
+  }
+
+  /**
+   * @template T
+   * @param {() => Promise<T>} work
+   * @returns {Promise<T>}
+   */
+  #queue(work) {
+    this.pending += 1;
+    const run = this.last.then(work, work).finally(() => {
+      this.pending -= 1;
+    });
+    this.last = run.catch(() => undefined);
+    return run;
+  }
+
+  async reload() {
+    this.labels.replace(await getState());
+    this.listener.changed();
+    this.#refreshProjections();
+  }
+
+  /**
+   * @param {unknown} error
+   * @returns {Promise<false>}
+   */
+  async #refused(error) {
+    if (!(error instanceof ServerError)) throw error;
+    this.labels.hopes.clear();
+    if (error.status === STALE) {
+      await this.reload().catch(() => undefined);
+      this.listener.tell("warning", "Not done: the labels had changed elsewhere first. They have been read again; look, then repeat.");
+    } else {
+      this.listener.tell("error", error.hint ? `${error.message} — ${error.hint}` : error.message);
+    }
+    this.listener.changed();
+    return false;
+  }
+
+  /**
+   * @param {Edit[]} edits one step of undo
+   * @returns {Promise<boolean>} whether it is done, and on disk
+   */
+  edit(edits) {
+    const seen = this.labels.touchedBy(edits);
+    return this.#queue(async () => {
+      try {
+        await this.#edit(edits, seen);
+        return true;
+      } catch (error) {
+        return this.#refused(error);
+      }
+    });
+  }
+
+  /**
+   * @param {Edit[]} edits
+   * @param {string} seen what the user saw of what the edits touch
+   */
+  async #edit(edits, seen) {
+    for (let tries = 0; ; tries += 1) {
+      try {
+        return this.#answered(await postEdits(this.labels.state.revision, edits));
+      } catch (error) {
+        // A running tracker raises the revision many times a second. What it did elsewhere is no reason to refuse;
+        // where it changed what the user saw, it is.
+        const stale = error instanceof ServerError && error.status === STALE;
+        if (!stale || this.labels.running.length === 0 || tries > 3) throw error;
+        this.labels.replace(await getState());
+        if (this.labels.touchedBy(edits) !== seen) throw error;
+      }
+    }
+  }
+
+  /** @param {Change} change */
+  async #answered(change) {
+    if (this.#apply(change) === "missed") await this.reload();
+  }
+
+  /**
+   * @param {"undo" | "redo"} which
+   * @returns {Promise<Change | null>}
+   */
+  history(which) {
+    return this.#queue(async () => {
+      try {
+        const change = await postHistory(which, this.labels.state.revision);
+        await this.#answered(change);
+        return change;
+      } catch (error) {
+        await this.#refused(error);
+        return null;
+      }
+    });
+  }
+
+  /**
+   * @param {string[]} points
+   * @param {number} frame
+   * @param {Direction} direction
+   * @param {number | null} until
+   * @returns {Promise<boolean>} whether it has begun
+   */
+  track(points, frame, direction, until) {
+    return this.#queue(async () => {
+      try {
+        const job = await postTrack(this.labels.state.revision, { points, frame, direction, until });
+        if (job.state === "running") this.labels.applyJob(job);
+        this.listener.changed();
+        return true;
+      } catch (error) {
+        return this.#refused(error);
+      }
+    });
+  }
+
+  /** @param {string[]} [points] only the jobs of these */
+  async stop(points) {
+    const jobs = this.labels.running.filter((job) => !points || job.points.some((name) => points.includes(name)));
+    for (const job of jobs) {
+      // It may have ended in the meantime: then there is nothing to stop.
+      await stopTrack(job.id).catch(() => undefined);
+    }
+    return jobs.length;
+  }
+
+  /**
+   * @param {string} format
+   * @param {{content: string, encoding: "text" | "base64", replace: boolean}} body
+   * @returns {Promise<boolean>}
+   */
+  bringIn(format, body) {
+    return this.#queue(async () => {
+      try {
+        await this.#answered(await postImport(format, body));
+        return true;
+      } catch (error) {
+        if (error instanceof ServerError && error.status === STALE) {
+          this.listener.tell("warning", error.hint ? `${error.message} — ${error.hint}` : error.message);
+          return false;
+        }
+        return this.#refused(error);
+      }
+    });
+  }
+
+  #refreshProjections() {
+    if (this.labels.state.streams.length === 0 || this.projectionsTimer) return;
+    this.projectionsTimer = window.setTimeout(async () => {
+      this.projectionsTimer = 0;
+      const revision = this.labels.state.revision;
+      try {
+        this.labels.setProjections(await getProjections());
+        this.listener.changed();
+      } catch {
+        this.labels.setProjections(null);
+      }
+      if (revision !== this.labels.state.revision) this.#refreshProjections();
+    }, PROJECTIONS_AFTER_MS);
+  }
+}

@@ -1,0 +1,92 @@
+// Shapes of what the server says. Types only: nothing here runs.
+// Stamps are strings of nanoseconds, for they exceed what a double holds. Pixels have their centres at integers.
+
+/** @typedef {"manual" | "auto" | "detected" | "interpolated"} Source */
+
+/**
+ * One point seen in one frame.
+ * @typedef {object} Observation
+ * @property {number} frame the data set's own frame index
+ * @property {string} stamp_ns
+ * @property {number} u pixels, to the right
+ * @property {number} v pixels, down
+ * @property {Source} source
+ * @property {boolean} keyframe starts a segment
+ * @property {boolean} occluded
+ * @property {boolean} uncertain
+ * @property {number | null} confidence 0 to 1, of an automatic observation
+ * @property {boolean} seeded the search began where an estimate pointed
+ */
+
+/** @typedef {{name: string, observations: Observation[]}} Point */
+
+/** @typedef {{frame: number, stamp_ns: string, time_s: number}} Frame */
+
+/**
+ * @typedef {object} Job
+ * @property {number | string} id
+ * @property {string} kind
+ * @property {string[]} points
+ * @property {string} [direction]
+ * @property {number} done
+ * @property {number} total
+ * @property {"running" | "done" | "stopped" | "failed"} state
+ * @property {string | null} [message]
+ */
+
+/**
+ * @typedef {object} State
+ * @property {number} revision
+ * @property {string} dataset
+ * @property {string} format
+ * @property {string} camera
+ * @property {number} width
+ * @property {number} height
+ * @property {string} labels_file
+ * @property {boolean} writable
+ * @property {string | null} read_only_reason
+ * @property {Frame[]} frames
+ * @property {Point[]} points
+ * @property {boolean} can_undo
+ * @property {boolean} can_redo
+ * @property {boolean} floor_suggestions
+ * @property {string[]} streams
+ * @property {Job[]} jobs
+ * @property {string} version
+ * @property {Record<string, string[]>} [keys]
+ * @property {number} [doubt_below]
+ */
+
+/**
+ * @typedef {object} Change
+ * @property {number} revision
+ * @property {Point[]} points whole lanes of the points that changed
+ * @property {string[]} removed
+ * @property {boolean} can_undo
+ * @property {boolean} can_redo
+ * @property {string} by
+ * @property {string} label what the step was
+ */
+
+/**
+ * @typedef {{op: "place", point: string, frame: number, u: number, v: number}
+ *   | {op: "mark", point: string, frame: number, occluded?: boolean, uncertain?: boolean, keyframe?: boolean}
+ *   | {op: "delete", point: string, frame: number}
+ *   | {op: "delete-after", point: string, frame: number}
+ *   | {op: "remove-point", point: string}
+ *   | {op: "rename", point: string, to: string}} Edit
+ */
+
+/** @typedef {"forward" | "backward" | "both"} Direction */
+
+/** @typedef {{u: number, v: number, score: number, depth_m: number | null}} Suggestion */
+
+/** @typedef {{name: string, kind: "reference" | "on-board", rmse_px: Record<string, number> | null}} Stream */
+
+/** @typedef {{stream: number, point: string, frame: number, u: number, v: number, error_px: number | null}} Dot */
+
+/** @typedef {{streams: Stream[], dots: Dot[], skips: {reason: string, count: number}[]}} Projections */
+
+/** @typedef {{u: number, v: number}} Pixel */
+
+export {};
