@@ -28,6 +28,10 @@ use std::fmt;
 use std::marker::PhantomData;
 use std::ops::Mul;
 
+mod batch;
+
+pub(crate) use batch::Motion;
+
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 /// The fixed global frame of a pose stream.

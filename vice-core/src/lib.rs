@@ -17,6 +17,7 @@ pub mod evaluate;
 pub mod frames;
 pub mod imu;
 pub mod label;
+pub mod lanes;
 pub mod metrics;
 pub mod registry;
 pub mod result;

@@ -7,8 +7,9 @@
 
 use nalgebra::Point3;
 
-use crate::camera::{Camera, Pixel, ProjectError, UnprojectError};
-use crate::frames::{self, Rigid, WorldFromCamera};
+use crate::camera::{Camera, Pixel, ProjectError, Track, UnprojectError, with_lens};
+use crate::frames::{self, Motion, Rigid, WorldFromCamera};
+use crate::lanes::{Element, run};
 
 /// The scene point of a pixel: `z (x, y, 1)` in the camera frame, metres; `z_m` is along the optical axis.
 ///
@@ -34,37 +35,26 @@ pub fn track(
     camera.project(&now_from_keyframe.transform_point(point_camera_m))
 }
 
-/// [`lift`] and [`track`] for many pixels of one key frame, in structure-of-arrays form.
+/// [`lift`] and [`track`] for many pixels of one key frame, in structure-of-arrays form and one pass over memory.
 ///
-/// `(u, v)` are pixels of the key frame, `z_m` their depths. The tracked pixels replace them. Where a pixel has no ray
+/// `uv_px` are pixels of the key frame, `z_m` their depths, metres. The tracked pixels replace them. Where a pixel has no ray
 /// or its point no pixel, `valid[i]` is false and the pixel NaN. Returns how many are valid.
 ///
 /// # Panics
 /// If the slices differ in length.
-pub fn track_batch(
+pub fn track_batch<T: Element>(
     camera: &Camera,
     at_keyframe: &WorldFromCamera,
     now: &WorldFromCamera,
-    [u, v]: [&mut [f64]; 2],
-    z_m: &[f64],
+    uv_px: [&mut [T]; 2],
+    z_m: &[T],
     valid: &mut [bool],
 ) -> usize {
-    assert!(
-        [v.len(), z_m.len(), valid.len()].iter().all(|len| *len == u.len()),
-        "track_batch: slices differ in length"
-    );
     let now_from_keyframe: Rigid<frames::Camera, frames::Camera> = now.inverse() * *at_keyframe;
-    let mut count = 0;
-    for i in 0..u.len() {
-        let tracked = lift(camera, Pixel::new(u[i], v[i]), z_m[i])
-            .ok()
-            .and_then(|p| camera.project(&now_from_keyframe.transform_point(&p)).ok());
-        valid[i] = tracked.is_some();
-        count += usize::from(valid[i]);
-        let px = tracked.unwrap_or(Pixel::new(f64::NAN, f64::NAN));
-        (u[i], v[i]) = (px.u, px.v);
-    }
-    count
+    let now_from_keyframe = Motion::new(&now_from_keyframe);
+    with_lens!(camera, bound => {
+        run("track_batch", Track { bound, now_from_keyframe }, [z_m], uv_px, Some(valid))
+    })
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 //! `θ' = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)` and `(x', y') = θ'/r (x, y)`.
 
 use super::{Distortion, poly};
+use crate::lanes::Number;
 
 /// Equidistant coefficients.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -14,36 +15,40 @@ pub struct Equidistant {
 }
 
 impl Equidistant {
-    fn angle(&self, theta: f64) -> f64 {
+    #[inline(always)]
+    fn angle<N: Number>(&self, theta: N) -> N {
         let t = theta * theta;
-        theta * (1.0 + t * (self.k1 + t * (self.k2 + t * (self.k3 + t * self.k4))))
+        theta * (t * (t * (t * (t * self.k4 + self.k3) + self.k2) + self.k1) + 1.0)
     }
 
     /// Derivative of the distorted by the undistorted angle.
-    fn angle_rate(&self, theta: f64) -> f64 {
+    #[inline(always)]
+    fn angle_rate<N: Number>(&self, theta: N) -> N {
         let t = theta * theta;
-        1.0 + t * (3.0 * self.k1 + t * (5.0 * self.k2 + t * (7.0 * self.k3 + t * 9.0 * self.k4)))
+        t * (t * (t * (t * (9.0 * self.k4) + 7.0 * self.k3) + 5.0 * self.k2) + 3.0 * self.k1) + 1.0
     }
 }
 
+/// Below this radius the scale is 1 to the last bit, and the quotient of small numbers is not.
+const NEAR_AXIS: f64 = 1e-12;
+
 impl Distortion for Equidistant {
-    fn distort(&self, x: f64, y: f64) -> (f64, f64) {
+    #[inline(always)]
+    fn distort<N: Number>(&self, x: N, y: N) -> (N, N) {
         let r = (x * x + y * y).sqrt();
-        // Below this the scale is 1 to the last bit, and r may underflow.
-        let scale = if r > 1e-12 { self.angle(r.atan()) / r } else { 1.0 };
+        let scale = N::select(r.at_most(r.of(NEAR_AXIS)), r.of(1.0), self.angle(r.atan()) / r);
         (x * scale, y * scale)
     }
 
-    fn distort_with_jacobian(&self, x: f64, y: f64) -> ((f64, f64), [f64; 4]) {
+    #[inline(always)]
+    fn distort_with_jacobian<N: Number>(&self, x: N, y: N) -> ((N, N), [N; 4]) {
         let s = x * x + y * y;
         let r = s.sqrt();
-        if r <= 1e-12 {
-            return ((x, y), [1.0, 0.0, 0.0, 1.0]);
-        }
+        let on_axis = r.at_most(r.of(NEAR_AXIS));
         let theta = r.atan();
-        let scale = self.angle(theta) / r;
+        let scale = N::select(on_axis, r.of(1.0), self.angle(theta) / r);
         // d(scale)/dr / r, with dθ/dr = 1/(1 + r²).
-        let slope = (self.angle_rate(theta) / (1.0 + s) - scale) / s;
+        let slope = N::select(on_axis, r.of(0.0), (self.angle_rate(theta) / (s + 1.0) - scale) / s);
         let cross = x * y * slope;
         ((x * scale, y * scale), [scale + x * x * slope, cross, cross, scale + y * y * slope])
     }

@@ -26,6 +26,9 @@ mod solve;
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::lanes::Number;
+
+pub(crate) use batch::{Bound, Pinhole, Track, with_lens};
 pub use equidistant::Equidistant;
 pub use radtan::Radtan;
 pub use rational::Rational;
@@ -81,11 +84,15 @@ pub enum Model {
 }
 
 /// A lens as seen by the solvers: where a normalised point goes, and how that changes.
-pub(crate) trait Distortion {
+///
+/// The formulas are written once for one point and for many side by side: see [`crate::lanes`].
+pub(crate) trait Distortion: Copy + Send + Sync {
+    /// Whether it does anything at all.
+    const DISTORTS: bool = true;
     /// Distorted coordinates of normalised `(x, y)`.
-    fn distort(&self, x: f64, y: f64) -> (f64, f64);
+    fn distort<N: Number>(&self, x: N, y: N) -> (N, N);
     /// The same, with the Jacobian `[dx'/dx, dx'/dy, dy'/dx, dy'/dy]`.
-    fn distort_with_jacobian(&self, x: f64, y: f64) -> ((f64, f64), [f64; 4]);
+    fn distort_with_jacobian<N: Number>(&self, x: N, y: N) -> ((N, N), [N; 4]);
     /// Undistorted radius up to which the radial part grows; infinity where it always does.
     fn max_radius(&self) -> f64;
     /// Distorted radius of an undistorted one, without the tangential part.

@@ -2,6 +2,7 @@
 //! `y' = y d + p1 (r² + 2 y²) + 2 p2 x y` with `d = 1 + k1 r² + k2 r⁴ + k3 r⁶`.
 
 use super::{Distortion, poly};
+use crate::lanes::Number;
 
 /// Radial-tangential coefficients; `k3` is 0 where a calibration has only four.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -15,17 +16,19 @@ pub struct Radtan {
 }
 
 impl Distortion for Radtan {
-    fn distort(&self, x: f64, y: f64) -> (f64, f64) {
+    #[inline(always)]
+    fn distort<N: Number>(&self, x: N, y: N) -> (N, N) {
         let (xx, yy, xy) = (x * x, y * y, x * y);
         let s = xx + yy;
-        let d = 1.0 + s * (self.k1 + s * (self.k2 + s * self.k3));
+        let d = s * (s * (s * self.k3 + self.k2) + self.k1) + 1.0;
         tangential(x, y, d, s, xx, yy, xy, self.p1, self.p2)
     }
 
-    fn distort_with_jacobian(&self, x: f64, y: f64) -> ((f64, f64), [f64; 4]) {
+    #[inline(always)]
+    fn distort_with_jacobian<N: Number>(&self, x: N, y: N) -> ((N, N), [N; 4]) {
         let s = x * x + y * y;
-        let d = 1.0 + s * (self.k1 + s * (self.k2 + s * self.k3));
-        let d_ds = self.k1 + s * (2.0 * self.k2 + s * 3.0 * self.k3);
+        let d = s * (s * (s * self.k3 + self.k2) + self.k1) + 1.0;
+        let d_ds = s * (s * (3.0 * self.k3) + 2.0 * self.k2) + self.k1;
         brown_with_jacobian(x, y, d, d_ds, self.p1, self.p2)
     }
 
@@ -41,37 +44,29 @@ impl Distortion for Radtan {
 }
 
 #[expect(clippy::too_many_arguments, reason = "products that both callers already have")]
-pub(super) fn tangential(
-    x: f64,
-    y: f64,
-    d: f64,
-    s: f64,
-    xx: f64,
-    yy: f64,
-    xy: f64,
-    p1: f64,
-    p2: f64,
-) -> (f64, f64) {
-    (x * d + 2.0 * p1 * xy + p2 * (s + 2.0 * xx), y * d + p1 * (s + 2.0 * yy) + 2.0 * p2 * xy)
+#[inline(always)]
+pub(super) fn tangential<N: Number>(x: N, y: N, d: N, s: N, xx: N, yy: N, xy: N, p1: f64, p2: f64) -> (N, N) {
+    (x * d + xy * (2.0 * p1) + (s + xx * 2.0) * p2, y * d + (s + yy * 2.0) * p1 + xy * (2.0 * p2))
 }
 
 /// Brown's form for any radial factor `d(s)` with derivative `d_ds`, `s = r²`.
-pub(super) fn brown_with_jacobian(
-    x: f64,
-    y: f64,
-    d: f64,
-    d_ds: f64,
+#[inline(always)]
+pub(super) fn brown_with_jacobian<N: Number>(
+    x: N,
+    y: N,
+    d: N,
+    d_ds: N,
     p1: f64,
     p2: f64,
-) -> ((f64, f64), [f64; 4]) {
+) -> ((N, N), [N; 4]) {
     let (xx, yy, xy) = (x * x, y * y, x * y);
     let distorted = tangential(x, y, d, xx + yy, xx, yy, xy, p1, p2);
-    let cross = 2.0 * xy * d_ds + 2.0 * p1 * x + 2.0 * p2 * y;
+    let cross = xy * 2.0 * d_ds + x * (2.0 * p1) + y * (2.0 * p2);
     let jacobian = [
-        d + 2.0 * xx * d_ds + 2.0 * p1 * y + 6.0 * p2 * x,
+        d + xx * 2.0 * d_ds + y * (2.0 * p1) + x * (6.0 * p2),
         cross,
         cross,
-        d + 2.0 * yy * d_ds + 6.0 * p1 * y + 2.0 * p2 * x,
+        d + yy * 2.0 * d_ds + y * (6.0 * p1) + x * (2.0 * p2),
     ];
     (distorted, jacobian)
 }

@@ -2,6 +2,7 @@
 //! `d = (1 + k1 r² + k2 r⁴ + k3 r⁶) / (1 + k4 r² + k5 r⁴ + k6 r⁶)`.
 
 use super::{Distortion, poly, radtan};
+use crate::lanes::Number;
 
 /// Rational coefficients.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -18,25 +19,28 @@ pub struct Rational {
 }
 
 impl Rational {
-    fn factor(&self, s: f64) -> f64 {
-        let n = 1.0 + s * (self.k1 + s * (self.k2 + s * self.k3));
-        n / (1.0 + s * (self.k4 + s * (self.k5 + s * self.k6)))
+    #[inline(always)]
+    fn factor<N: Number>(&self, s: N) -> N {
+        let n = s * (s * (s * self.k3 + self.k2) + self.k1) + 1.0;
+        n / (s * (s * (s * self.k6 + self.k5) + self.k4) + 1.0)
     }
 }
 
 impl Distortion for Rational {
-    fn distort(&self, x: f64, y: f64) -> (f64, f64) {
+    #[inline(always)]
+    fn distort<N: Number>(&self, x: N, y: N) -> (N, N) {
         let (xx, yy, xy) = (x * x, y * y, x * y);
         let s = xx + yy;
         radtan::tangential(x, y, self.factor(s), s, xx, yy, xy, self.p1, self.p2)
     }
 
-    fn distort_with_jacobian(&self, x: f64, y: f64) -> ((f64, f64), [f64; 4]) {
+    #[inline(always)]
+    fn distort_with_jacobian<N: Number>(&self, x: N, y: N) -> ((N, N), [N; 4]) {
         let s = x * x + y * y;
-        let n = 1.0 + s * (self.k1 + s * (self.k2 + s * self.k3));
-        let m = 1.0 + s * (self.k4 + s * (self.k5 + s * self.k6));
-        let n_ds = self.k1 + s * (2.0 * self.k2 + s * 3.0 * self.k3);
-        let m_ds = self.k4 + s * (2.0 * self.k5 + s * 3.0 * self.k6);
+        let n = s * (s * (s * self.k3 + self.k2) + self.k1) + 1.0;
+        let m = s * (s * (s * self.k6 + self.k5) + self.k4) + 1.0;
+        let n_ds = s * (s * (3.0 * self.k3) + 2.0 * self.k2) + self.k1;
+        let m_ds = s * (s * (3.0 * self.k6) + 2.0 * self.k5) + self.k4;
         radtan::brown_with_jacobian(x, y, n / m, (n_ds * m - n * m_ds) / (m * m), self.p1, self.p2)
     }
 

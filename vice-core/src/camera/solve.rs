@@ -1,10 +1,13 @@
 //! The inverse of a distortion.
 
 use super::{Distortion, UNPROJECT_TOLERANCE, UnprojectError};
+use crate::lanes::Number;
 
 /// Steps smaller than this are rounding.
 const STEP_DONE: f64 = 1e-14;
 const MAX_STEPS: usize = 30;
+/// A hair of slack: a point on the rim itself must come back.
+const RIM: f64 = 1.0 + 1e-9;
 
 /// Normalised coordinates whose distortion is `(xd, yd)`.
 ///
@@ -33,27 +36,35 @@ fn newton<D: Distortion>(
 ) -> Result<(f64, f64), UnprojectError> {
     let mut step = f64::INFINITY;
     for _ in 0..MAX_STEPS {
-        let ((fx, fy), [a, b, c, d]) = lens.distort_with_jacobian(x, y);
-        let (ex, ey) = (xd - fx, yd - fy);
-        let det = a * d - b * c;
-        let (dx, dy) = ((d * ex - b * ey) / det, (a * ey - c * ex) / det);
         let previous = step;
-        step = dx.hypot(dy);
+        (x, y, step) = newton_step(lens, (xd, yd), (x, y));
         if !step.is_finite() {
             return Err(UnprojectError::NotConverged);
         }
-        x += dx;
-        y += dy;
-        // Done at the last bits, or when below the tolerance the steps no longer shrink.
-        if step <= STEP_DONE * (1.0 + x.abs() + y.abs())
-            || (step <= UNPROJECT_TOLERANCE * 0.1 && step >= previous)
-        {
-            // A hair of slack: a point on the rim itself must come back.
-            let inside = x.hypot(y) <= max_radius * (1.0 + 1e-9);
+        if settled(step, previous, x, y) {
+            let inside = (x * x + y * y).sqrt() <= max_radius * RIM;
             return if inside { Ok((x, y)) } else { Err(UnprojectError::OutsideModel) };
         }
     }
     Err(UnprojectError::NotConverged)
+}
+
+/// The next place of Newton's method, and how far it is from the last one.
+#[inline(always)]
+pub(super) fn newton_step<D: Distortion, N: Number>(lens: &D, (xd, yd): (N, N), (x, y): (N, N)) -> (N, N, N) {
+    let ((fx, fy), [a, b, c, d]) = lens.distort_with_jacobian(x, y);
+    let (ex, ey) = (xd - fx, yd - fy);
+    let per_det = x.of(1.0) / (a * d - b * c);
+    let (dx, dy) = ((d * ex - b * ey) * per_det, (a * ey - c * ex) * per_det);
+    (x + dx, y + dy, (dx * dx + dy * dy).sqrt())
+}
+
+/// Done at the last bits, or when below the tolerance the steps no longer shrink.
+#[inline(always)]
+pub(super) fn settled<N: Number>(step: N, previous: N, x: N, y: N) -> N::Mask {
+    let last_bits = step.at_most((x.abs() + y.abs() + 1.0) * STEP_DONE);
+    let stalled = step.both(step.at_most(step.of(UNPROJECT_TOLERANCE * 0.1)), previous.at_most(step));
+    step.either(last_bits, stalled)
 }
 
 /// The undistorted radius of a distorted one, by bisection; `None` beyond the rim.

@@ -1,0 +1,174 @@
+//! The formulas of a camera for a register of points. They follow [`Camera::project`], [`Camera::unproject`] and
+//! [`crate::track::track`] operation by operation.
+
+use nalgebra::{Point3, Vector3};
+use pulp::Simd;
+
+use super::super::solve;
+use super::{Camera, Motion};
+use crate::camera::{Distortion, Pixel};
+use crate::lanes::{Kernel, Lanes, Masked, Number};
+
+/// Steps of Newton's method for a register of points; the single-point function decides what needs more.
+const LANE_STEPS: usize = 10;
+/// Beyond this part of the valid radius the single-point function decides: at the rim the Jacobian is singular, and
+/// what is left of the last bits depends on the order of operations.
+const NEAR_RIM: f64 = 0.999;
+/// The same where a lens has no rim: a ray so nearly at right angles to the axis is one of a pixel that none reaches.
+const GRAZING: f64 = 1e4;
+
+/// No distortion.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pinhole;
+
+impl Distortion for Pinhole {
+    const DISTORTS: bool = false;
+
+    #[inline(always)]
+    fn distort<N: Number>(&self, x: N, y: N) -> (N, N) {
+        (x, y)
+    }
+
+    #[inline(always)]
+    fn distort_with_jacobian<N: Number>(&self, x: N, y: N) -> ((N, N), [N; 4]) {
+        ((x, y), [x.of(1.0), x.of(0.0), x.of(0.0), x.of(1.0)])
+    }
+
+    fn max_radius(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    fn radial(&self, r: f64) -> f64 {
+        r
+    }
+}
+
+/// A camera whose lens is known at compile time.
+#[derive(Clone, Copy)]
+pub(crate) struct Bound<D> {
+    camera: Camera,
+    lens: D,
+    /// What the squared radius is compared with: infinite ones are outside too.
+    max_r2: f64,
+}
+
+impl<D: Distortion> Bound<D> {
+    pub(crate) fn new(camera: &Camera, lens: D) -> Self {
+        let max_r2 = (camera.max_radius * camera.max_radius).min(f64::MAX);
+        Self { camera: *camera, lens, max_r2 }
+    }
+
+    /// Pixel, and whether there is one.
+    #[inline(always)]
+    fn project<S: Simd>(&self, [x, y, z]: [Lanes<S>; 3]) -> ([Lanes<S>; 2], S::m64s) {
+        let (x, y) = (x / z, y / z);
+        let r2 = x * x + y * y;
+        let valid = z.both(z.of(0.0).below(z), r2.at_most(r2.of(self.max_r2)));
+        let (xd, yd) = self.lens.distort(x, y);
+        ([xd * self.camera.fx + self.camera.cx, yd * self.camera.fy + self.camera.cy], valid)
+    }
+
+    /// Ray, whether there is one, and where the single-point function must decide.
+    #[inline(always)]
+    fn unproject<S: Simd>(&self, [u, v]: [Lanes<S>; 2]) -> ([Lanes<S>; 2], S::m64s, S::m64s) {
+        let c = &self.camera;
+        let (xd, yd) = ((u - c.cx) / u.of(c.fx), (v - c.cy) / v.of(c.fy));
+        let largest = u.of(f64::MAX);
+        let finite = u.both(xd.abs().at_most(largest), yd.abs().at_most(largest));
+        if !D::DISTORTS {
+            return ([xd, yd], finite, u.of(1.0).below(u.of(0.0)));
+        }
+        let (mut x, mut y, mut step) = (xd, yd, u.of(f64::INFINITY));
+        // A pixel that is not finite is done, and not valid.
+        let mut done = u.negated(finite);
+        let mut steps = 0;
+        while steps < LANE_STEPS && u.any(u.negated(done)) {
+            steps += 1;
+            let (next_x, next_y, next_step) = solve::newton_step(&self.lens, (xd, yd), (x, y));
+            (x, y) = (Lanes::select(done, x, next_x), Lanes::select(done, y, next_y));
+            done = u.either(done, solve::settled(next_step, step, x, y));
+            step = next_step;
+        }
+        let inside = (x * x + y * y).sqrt().at_most(u.of((c.max_radius * NEAR_RIM).min(GRAZING)));
+        let found = u.both(done, inside);
+        (([x, y]), u.both(finite, found), u.both(finite, u.negated(found)))
+    }
+}
+
+/// Points of the camera frame to pixels.
+#[derive(Clone, Copy)]
+pub(super) struct Project<D> {
+    pub(super) bound: Bound<D>,
+}
+
+impl<D: Distortion> Kernel<3, 2> for Project<D> {
+    #[inline(always)]
+    fn lanes<S: Simd>(&self, _: [Lanes<S>; 2], xyz_m: [Lanes<S>; 3]) -> Masked<S, 2> {
+        let (numbers, valid) = self.bound.project(xyz_m);
+        Masked { numbers, valid, unsure: None }
+    }
+
+    fn single(&self, _: [f64; 2], xyz_m: [f64; 3]) -> Option<[f64; 2]> {
+        self.bound.camera.project(&Point3::from(xyz_m)).ok().map(Into::into)
+    }
+}
+
+/// Points of another frame to pixels.
+#[derive(Clone, Copy)]
+pub(super) struct ProjectMoved<D> {
+    pub(super) bound: Bound<D>,
+    pub(super) motion: Motion,
+}
+
+impl<D: Distortion> Kernel<3, 2> for ProjectMoved<D> {
+    #[inline(always)]
+    fn lanes<S: Simd>(&self, _: [Lanes<S>; 2], xyz_m: [Lanes<S>; 3]) -> Masked<S, 2> {
+        let (numbers, valid) = self.bound.project(self.motion.apply(xyz_m));
+        Masked { numbers, valid, unsure: None }
+    }
+
+    fn single(&self, _: [f64; 2], xyz_m: [f64; 3]) -> Option<[f64; 2]> {
+        self.bound.camera.project(&Point3::from(self.motion.apply(xyz_m))).ok().map(Into::into)
+    }
+}
+
+/// Pixels to rays.
+#[derive(Clone, Copy)]
+pub(super) struct Unproject<D> {
+    pub(super) bound: Bound<D>,
+}
+
+impl<D: Distortion> Kernel<2, 2> for Unproject<D> {
+    #[inline(always)]
+    fn lanes<S: Simd>(&self, _: [Lanes<S>; 2], uv_px: [Lanes<S>; 2]) -> Masked<S, 2> {
+        let (numbers, valid, unsure) = self.bound.unproject(uv_px);
+        Masked { numbers, valid, unsure: Some(unsure) }
+    }
+
+    fn single(&self, _: [f64; 2], [u, v]: [f64; 2]) -> Option<[f64; 2]> {
+        self.bound.camera.unproject(Pixel::new(u, v)).ok().map(|ray| [ray.x, ray.y])
+    }
+}
+
+/// Equation 1: pixels of a key frame with their depth to pixels of a later frame.
+#[derive(Clone, Copy)]
+pub(crate) struct Track<D> {
+    pub(crate) bound: Bound<D>,
+    pub(crate) now_from_keyframe: Motion,
+}
+
+impl<D: Distortion> Kernel<1, 2> for Track<D> {
+    #[inline(always)]
+    fn lanes<S: Simd>(&self, uv_px: [Lanes<S>; 2], [z_m]: [Lanes<S>; 1]) -> Masked<S, 2> {
+        let ([x, y], has_ray, unsure) = self.bound.unproject(uv_px);
+        let point = self.now_from_keyframe.apply([x * z_m, y * z_m, z_m]);
+        let (numbers, valid) = self.bound.project(point);
+        Masked { numbers, valid: z_m.both(has_ray, valid), unsure: Some(unsure) }
+    }
+
+    fn single(&self, [u, v]: [f64; 2], [z_m]: [f64; 1]) -> Option<[f64; 2]> {
+        let ray: Vector3<f64> = self.bound.camera.unproject(Pixel::new(u, v)).ok()?;
+        let point = self.now_from_keyframe.apply([ray.x * z_m, ray.y * z_m, z_m]);
+        self.bound.camera.project(&Point3::from(point)).ok().map(Into::into)
+    }
+}

@@ -1,0 +1,197 @@
+//! Drives a kernel over slices.
+
+use pulp::{Simd, WithSimd, bytemuck};
+
+use super::{ARCH, Element, Lanes, Number};
+
+/// Points below which one thread is faster: waking another costs some ten microseconds.
+const PARALLEL_POINTS: usize = 32_768;
+/// Points that a thread works on at a time. Smaller pieces share better among busy threads, larger ones cost less.
+const PIECE_POINTS: usize = 16_384;
+/// Bytes; pieces are a multiple of so many points, so that no two threads write to the same line of a mask.
+const CACHE_LINE: usize = 64;
+
+/// A formula from the numbers of a point to numbers of the same point.
+///
+/// `IN` slices are read only; `OUT` slices are read, where the formula uses what they hold, and written.
+pub(crate) trait Kernel<const IN: usize, const OUT: usize>: Copy + Send + Sync {
+    /// The formula for a register of points. It must be `#[inline(always)]` with all that it calls and use no closures:
+    /// what is not inlined is compiled for the smallest instruction set.
+    fn lanes<S: Simd>(&self, inout: [Lanes<S>; OUT], input: [Lanes<S>; IN]) -> Masked<S, OUT>;
+
+    /// The formula for one point, `None` where it has no result. It is asked where `lanes` was unsure.
+    fn single(&self, inout: [f64; OUT], input: [f64; IN]) -> Option<[f64; OUT]>;
+}
+
+/// What a kernel gives for a register of points.
+pub(crate) struct Masked<S: Simd, const OUT: usize> {
+    /// The numbers; what they are where not valid does not matter.
+    pub(crate) numbers: [Lanes<S>; OUT],
+    /// Which points have a result.
+    pub(crate) valid: S::m64s,
+    /// Which points the formula for one point must decide.
+    pub(crate) unsure: Option<S::m64s>,
+}
+
+/// Runs a kernel over slices of one length. `valid[i]`, where it is asked for, tells which points have a result; where
+/// a point has none its numbers are NaN. Returns how many have one.
+///
+/// # Panics
+/// If the slices differ in length; `name` stands in the message.
+pub(crate) fn run<T: Element, K: Kernel<IN, OUT>, const IN: usize, const OUT: usize>(
+    name: &str,
+    kernel: K,
+    input: [&[T]; IN],
+    inout: [&mut [T]; OUT],
+    valid: Option<&mut [bool]>,
+) -> usize {
+    const { assert!(OUT > 0) };
+    let n = inout[0].len();
+    let same_length = input.iter().all(|s| s.len() == n)
+        && inout.iter().all(|s| s.len() == n)
+        && valid.as_ref().is_none_or(|v| v.len() == n);
+    assert!(same_length, "{name}: slices differ in length");
+    let drive = Drive { kernel, input, inout, valid };
+    if n >= PARALLEL_POINTS && rayon::current_num_threads() > 1 {
+        drive.in_parallel()
+    } else {
+        ARCH.dispatch(drive)
+    }
+}
+
+struct Drive<'a, T, K, const IN: usize, const OUT: usize> {
+    kernel: K,
+    input: [&'a [T]; IN],
+    inout: [&'a mut [T]; OUT],
+    valid: Option<&'a mut [bool]>,
+}
+
+impl<T: Element, K: Kernel<IN, OUT>, const IN: usize, const OUT: usize> Drive<'_, T, K, IN, OUT> {
+    /// Halves the slices until they are small and lets idle threads take the other half.
+    fn in_parallel(self) -> usize {
+        let n = self.inout[0].len();
+        if n <= PIECE_POINTS {
+            return ARCH.dispatch(self);
+        }
+        let (a, b) = self.split_at((n / 2).next_multiple_of(CACHE_LINE));
+        let (a, b) = rayon::join(|| a.in_parallel(), || b.in_parallel());
+        a + b
+    }
+
+    fn split_at(self, middle: usize) -> (Self, Self) {
+        let (mut inout_a, mut inout_b) = ([const { None }; OUT], [const { None }; OUT]);
+        for (k, slice) in self.inout.into_iter().enumerate() {
+            let (a, b) = slice.split_at_mut(middle);
+            (inout_a[k], inout_b[k]) = (Some(a), Some(b));
+        }
+        let (valid_a, valid_b) = self.valid.map(|v| v.split_at_mut(middle)).unzip();
+        let a = Self {
+            kernel: self.kernel,
+            input: self.input.map(|s| &s[..middle]),
+            inout: inout_a.map(Option::unwrap_or_default),
+            valid: valid_a,
+        };
+        let b = Self {
+            kernel: self.kernel,
+            input: self.input.map(|s| &s[middle..]),
+            inout: inout_b.map(Option::unwrap_or_default),
+            valid: valid_b,
+        };
+        (a, b)
+    }
+}
+
+impl<T: Element, K: Kernel<IN, OUT>, const IN: usize, const OUT: usize> WithSimd
+    for Drive<'_, T, K, IN, OUT>
+{
+    type Output = usize;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) -> usize {
+        let n = self.inout[0].len();
+        let mut counts = simd.splat_u64s(0);
+        let mut at = 0;
+        while n - at >= S::F64_LANES {
+            let flags = self.step(simd, at, at + S::F64_LANES);
+            counts = simd.add_u64s(counts, flags);
+            at += S::F64_LANES;
+        }
+        let mut count = 0;
+        for word in bytemuck::cast_slice::<S::u64s, u64>(std::slice::from_ref(&counts)) {
+            count += *word;
+        }
+        if at < n {
+            let flags = self.step(simd, at, n);
+            let words: &[u64] = bytemuck::cast_slice(std::slice::from_ref(&flags));
+            for word in &words[..n - at] {
+                count += *word;
+            }
+        }
+        count as usize
+    }
+}
+
+impl<T: Element, K: Kernel<IN, OUT>, const IN: usize, const OUT: usize> Drive<'_, T, K, IN, OUT> {
+    // Loops count: an iterator's closure might be compiled for the smallest instruction set.
+    #[allow(clippy::needless_range_loop)]
+    /// The points `from..to`, at most a register of them. Gives 1 where a point has a result, else 0.
+    #[inline(always)]
+    fn step<S: Simd>(&mut self, simd: S, from: usize, to: usize) -> S::u64s {
+        let zero = Lanes { simd, v: simd.splat_f64s(0.0) };
+        let (mut input, mut inout) = ([zero; IN], [zero; OUT]);
+        for k in 0..IN {
+            input[k] = Lanes::load(simd, &self.input[k][from..to]);
+        }
+        for k in 0..OUT {
+            inout[k] = Lanes::load(simd, &self.inout[k][from..to]);
+        }
+        let Masked { numbers, valid, unsure } = self.kernel.lanes(inout, input);
+        for k in 0..OUT {
+            let number = Lanes::select(valid, numbers[k], zero.of(f64::NAN));
+            number.store(&mut self.inout[k][from..to]);
+        }
+        let mut flags = simd.select_u64s(valid, simd.splat_u64s(1), simd.splat_u64s(0));
+        let words: &mut [u64] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut flags));
+        if let Some(unsure) = unsure
+            && zero.any(unsure)
+        {
+            let unsure = simd.select_u64s(unsure, simd.splat_u64s(1), simd.splat_u64s(0));
+            let unsure: &[u64] = bytemuck::cast_slice(std::slice::from_ref(&unsure));
+            self.decide(from, to, unsure, words, inout.map(|l| l.v), input.map(|l| l.v));
+        }
+        if let Some(valid) = &mut self.valid {
+            for (flag, word) in valid[from..to].iter_mut().zip(&*words) {
+                *flag = *word != 0;
+            }
+        }
+        flags
+    }
+
+    /// Asks the formula for one point where that for many was unsure. Rare, so that it is kept out of the loop.
+    #[cold]
+    #[inline(never)]
+    #[allow(clippy::needless_range_loop)]
+    fn decide<V: bytemuck::Pod>(
+        &mut self,
+        from: usize,
+        to: usize,
+        unsure: &[u64],
+        flags: &mut [u64],
+        inout: [V; OUT],
+        input: [V; IN],
+    ) {
+        let number = |v: &V, i: usize| bytemuck::cast_slice::<V, f64>(std::slice::from_ref(v))[i];
+        for i in 0..to - from {
+            if unsure[i] == 0 {
+                continue;
+            }
+            let inout = std::array::from_fn(|k| number(&inout[k], i));
+            let found = self.kernel.single(inout, std::array::from_fn(|k| number(&input[k], i)));
+            flags[i] = u64::from(found.is_some());
+            let numbers = found.unwrap_or([f64::NAN; OUT]);
+            for k in 0..OUT {
+                self.inout[k][from + i] = T::from_f64(numbers[k]);
+            }
+        }
+    }
+}
