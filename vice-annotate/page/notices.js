@@ -3,7 +3,7 @@
 import { button, make } from "./dom.js";
 
 const PASSING_MS = { info: 4500, warning: 9000, error: 12000 };
-const MOST = 4;
+const MOST = 3;
 
 export class Notices {
   /**
@@ -20,10 +20,9 @@ export class Notices {
    * @param {string} text
    */
   tell(kind, text) {
-    const last = this.notes.lastElementChild;
-    if (last instanceof HTMLElement && last.dataset.text === text) last.remove();
+    // Of plain notes only the newest is worth its room; what went wrong stays a while.
+    for (const old of this.notes.querySelectorAll(".note.info")) old.remove();
     const note = make("div", { class: `note ${kind}` }, [make("span", { text })]);
-    note.dataset.text = text;
     note.append(button("×", () => note.remove(), { class: "plain", label: "Close this note" }));
     this.notes.append(note);
     while (this.notes.childElementCount > MOST) this.notes.firstElementChild?.remove();

@@ -56,7 +56,7 @@ export class Panels {
     const { app } = this;
     const { names } = app.labels;
     const shown = app.labels.lanes.has(app.selected) ? names : [...names, app.selected];
-    const key = JSON.stringify([shown, app.writable]);
+    const key = JSON.stringify([shown, names.length, app.writable]);
     if (key !== this.listed) {
       this.listed = key;
       this.rows.clear();

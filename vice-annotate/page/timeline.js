@@ -8,6 +8,8 @@ import { DOUBT, pointColour } from "./palette.js";
 const LANE = 22;
 const RULER = 20;
 const NAMES = 92;
+/** Room for these is there from the start, so that the frame above does not jump with each new point. */
+const LEAST_LANES = 4;
 const LARGEST_ZOOM = 60;
 const STEPS_S = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600];
 
@@ -117,7 +119,7 @@ export class Timeline {
   draw() {
     const { app, canvas } = this;
     const { names } = app.labels;
-    const height = Math.max(RULER + LANE * Math.max(1, names.length) + 4, 40);
+    const height = RULER + LANE * Math.max(LEAST_LANES, names.length) + 4;
     const ratio = window.devicePixelRatio || 1;
     if (canvas.width !== Math.round(this.width * ratio) || canvas.height !== Math.round(height * ratio)) {
       canvas.width = Math.round(this.width * ratio);
