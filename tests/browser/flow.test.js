@@ -47,7 +47,7 @@ test("opens with the first frame, and fits 1280 x 720", async () => {
     down: document.documentElement.scrollHeight > innerHeight,
   }));
   assert.deepEqual(overflow, { across: false, down: false });
-  for (const name of ["Play", "Suggest", "Respawn", "Delete here", "Fit", "Undo", "Help"]) {
+  for (const name of ["Play", "New", "Respawn", "Delete here", "Fit", "Undo", "Help"]) {
     assert.ok(await first.page.getByRole("button", { name, exact: true }).isVisible(), name);
   }
 });

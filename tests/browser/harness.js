@@ -14,9 +14,9 @@ import { chromium } from "playwright-core";
 /** @import {Browser, Page} from "playwright-core" */
 /** @import {State} from "../../vice-annotate/page/types.js" */
 
-const ROOT = resolve(dirname(fileURLToPath(import.meta.url)), "../..");
+export const ROOT = resolve(dirname(fileURLToPath(import.meta.url)), "../..");
 const TARGET = process.env.CARGO_TARGET_DIR ?? join(ROOT, "target");
-const SCREENSHOTS = join(TARGET, "browser-screenshots");
+export const SCREENSHOTS = join(TARGET, "browser-screenshots");
 const START_MS = 60_000;
 export const WAIT_MS = 30_000;
 
@@ -254,7 +254,6 @@ export class Window {
     await this.page.fill("#frame", String(place));
     await this.page.keyboard.press("Enter");
     await this.page.waitForFunction((wanted) => document.getElementById("timeline")?.getAttribute("aria-valuenow") === wanted, String(place));
-    await this.page.focus("#marks");
   }
 
   /**

@@ -81,7 +81,7 @@ test("a respawn is offered after a lane that ended at the border, and not after 
 
 test("a correction tracks again up to the next observation by hand", () => {
   const labels = new Labels(state([seen(0), seen(2), seen(4), seen(6, { source: "manual" }), seen(8)]));
-  assert.equal(labels.nextManual("1", 2)?.frame, 6);
+  assert.equal(labels.nextFixed("1", 2)?.frame, 6);
   assert.equal(labels.followedByAutomatic("1", 2), true);
   assert.equal(labels.followedByAutomatic("1", 4), false);
   assert.equal(labels.followedByAutomatic("1", 6), true);

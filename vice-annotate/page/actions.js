@@ -59,7 +59,6 @@ export class Actions {
    */
   async #put(name, frame, pixel, keyframe) {
     const { app } = this;
-    const correction = app.labels.at(name, frame) !== null || app.labels.followedByAutomatic(name, frame);
     app.labels.hope(name, frame, pixel);
     app.changed();
     // What runs on this point works from what has just been corrected.
@@ -71,8 +70,8 @@ export class Actions {
     app.labels.hope(name, frame, null);
     app.changed();
     if (!done) return;
-    if (correction && app.switches.retrack && app.labels.followedByAutomatic(name, frame)) {
-      await app.session.track([name], frame, "forward", app.labels.nextManual(name, frame)?.frame ?? null);
+    if (app.switches.retrack && app.labels.followedByAutomatic(name, frame)) {
+      await app.session.track([name], frame, "forward", app.labels.nextFixed(name, frame)?.frame ?? null);
     }
   }
 
@@ -183,7 +182,7 @@ export class Actions {
     try {
       const list = await getSuggestions(frame, SUGGESTIONS);
       app.suggested = { frame, list };
-      if (list.length === 0) this.tell("warning", "No place in this frame can be tracked well and has a depth.");
+      if (list.length === 0) this.tell("warning", "There is no good place to suggest in this frame.");
     } catch (error) {
       if (!(error instanceof ServerError)) throw error;
       this.tell("error", `No suggestions: ${error.message}`);
@@ -199,7 +198,8 @@ export class Actions {
     if (app.respawning) return this.place(taken);
     const rest = app.suggestions.filter((_, other) => other !== index);
     app.suggested = rest.length > 0 ? { frame: app.frame, list: rest } : null;
-    app.selected = app.labels.at(app.selected, app.frame) ? app.labels.freeName() : app.selected;
+    // A place of its own is a point of its own; only a respawn goes on with an old one.
+    if (app.labels.lanes.has(app.selected)) app.selected = app.labels.freeName();
     await this.#put(app.selected, app.frame, { u: taken.u, v: taken.v }, false);
   }
 

@@ -167,22 +167,22 @@ export class Labels {
   /**
    * @param {string} name
    * @param {number} frame
-   * @returns {Observation | null} the next one by hand after a frame
+   * @returns {Observation | null} the next one after a frame that tracking must leave alone: by hand, detected, or the
+   *   beginning of a segment
    */
-  nextManual(name, frame) {
-    return this.#observations(name).find((each) => each.frame > frame && each.source === "manual") ?? null;
+  nextFixed(name, frame) {
+    const fixed = (/** @type {Observation} */ each) => each.source === "manual" || each.source === "detected" || each.keyframe;
+    return this.#observations(name).find((each) => each.frame > frame && fixed(each)) ?? null;
   }
 
   /**
    * @param {string} name
    * @param {number} frame
-   * @returns {boolean} whether a correction here has automatic observations after it, up to the next one by hand
+   * @returns {boolean} whether a correction here has automatic observations after it, up to the next fixed one
    */
   followedByAutomatic(name, frame) {
-    const until = this.nextManual(name, frame)?.frame ?? Infinity;
-    return this.#observations(name).some(
-      (each) => each.frame > frame && each.frame < until && each.source !== "manual" && each.source !== "detected",
-    );
+    const until = this.nextFixed(name, frame)?.frame ?? Infinity;
+    return this.#observations(name).some((each) => each.frame > frame && each.frame < until);
   }
 
   /** @param {string} name */

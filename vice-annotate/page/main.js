@@ -37,8 +37,11 @@ function listener(app, status) {
     finished: (job) => finished(job),
     connection: (state) => {
       status.connection = state;
-      if (state === "open") notices.clear("connection");
-      else if (state === "lost") notices.banner("connection", "error", "The server does not answer. Every change that was shown as saved is on disk.");
+      if (state === "open") {
+        notices.clear("connection");
+        // A frame that could not be fetched meanwhile is asked for again.
+        app.images.get(app.frame).then(() => app.changed());
+      } else if (state === "lost") notices.banner("connection", "error", "The server does not answer. Every change that was shown as saved is on disk.");
       else notices.banner("connection", "error", "The server has ended. Every change that was shown as saved is on disk; start `vice annotate` again and open its new address.");
       app.changed();
     },
@@ -265,15 +268,25 @@ async function open() {
   listenToKeys(app, table);
   listenToButtons(app, table);
   showKeyHints(app);
+  if (labels.state.floor_suggestions) setText(byId("suggest", HTMLElement), "Suggest on the floor");
   joinSwitches(app);
   speak(app);
   bringIn(app, tell);
   byId("speed", HTMLSelectElement).addEventListener("change", (event) => {
     player.speed = Number(/** @type {HTMLSelectElement} */ (event.target).value);
+    viewer.marks.focus();
   });
   byId("frame", HTMLInputElement).addEventListener("change", (event) => {
     const place = /** @type {HTMLInputElement} */ (event.target).valueAsNumber;
     if (Number.isInteger(place)) player.step(place - 1 - app.target);
+    viewer.marks.focus();
+  });
+  const menu = byId("file-menu", HTMLDetailsElement);
+  document.addEventListener("pointerdown", (event) => {
+    if (!(event.target instanceof Node && menu.contains(event.target))) menu.open = false;
+  });
+  menu.addEventListener("keydown", (event) => {
+    if (event.key === "Escape") menu.open = false;
   });
   for (const format of /** @type {const} */ (["json", "csv", "cvat"])) byId(`export-${format}`, HTMLAnchorElement).href = exportAddress(format);
   app.listeners.push(() => viewer.draw(), () => loupe.draw(app), () => timeline.draw(), () => panels.draw(), () => status.draw());

@@ -45,7 +45,7 @@ export class Session {
       lost: () => this.listener.connection("lost"),
       open: () => {
         this.listener.connection("open");
-        if (opened) this.reload();
+        if (opened) this.#queue(() => this.reload()).catch(() => undefined);
         opened = true;
       },
     });
@@ -193,6 +193,8 @@ export class Session {
       // It may have ended in the meantime: then there is nothing to stop.
       await stopTrack(job.id).catch(() => undefined);
     }
+    // Its last results may still be on their way: what comes next goes by the state with them.
+    if (jobs.length > 0) await this.#queue(() => this.reload()).catch(() => undefined);
     return jobs.length;
   }
 
