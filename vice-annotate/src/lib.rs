@@ -2,4 +2,5 @@
 //! what it doubts.
 #![forbid(unsafe_code)]
 
+pub mod suggest;
 pub mod tracker;

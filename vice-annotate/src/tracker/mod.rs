@@ -1,1 +1,31 @@
 //! The image tracker: where a scene point of one frame is in the next ones.
+//!
+//! | module | what |
+//! | --- | --- |
+//! | `pyramid` | an image and its halvings, to the bit as OpenCV makes them |
+//! | `window` | the neighbourhood of a place: gray values and gradients between pixels |
+//! | `lucas_kanade` | how far a window has moved from one frame to the next |
+//! | `affine` | a template that is matched with turn, scale, shear and light |
+//! | `point_track` | one point from frame to frame, with a confidence, until it is lost |
+//! | `corners` | places that can be tracked |
+//!
+//! [`PointTrack`] is what labels are made with. [`track_translation`] is its first stage alone, for many points.
+//!
+//! The crate `patch-tracker` was looked at first: it matches 52 samples of whole gray levels in five steps, always
+//! against the frame before, so that it drifts, and gives no confidence; see `benches/tracker.rs` for figures.
+
+mod affine;
+mod corners;
+mod lucas_kanade;
+mod point_track;
+mod pyramid;
+mod sampler;
+mod window;
+
+pub use corners::{Corner, corners};
+pub use lucas_kanade::{WINDOW_PX, track_translation};
+pub use point_track::{DOUBT_CONFIDENCE, Outcome, PointTrack, Step, TrackError, TrackOptions};
+pub use pyramid::Pyramid;
+
+/// Name and version of the tracker, for the labels that it made. It changes whenever its results may.
+pub const TRACKER_VERSION: &str = "vice-klt/1";
