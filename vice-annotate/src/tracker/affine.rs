@@ -150,7 +150,7 @@ impl Template {
             warp.at = Pixel::new(warp.at.u - moved.x, warp.at.v - moved.y);
             let reach = f64::from(REACH_PX);
             let rim_px = moved.norm() + reach * (linear - Matrix2::identity()).norm();
-            if !(rim_px < LONG_STEP_PX) {
+            if !rim_px.is_finite() || rim_px > LONG_STEP_PX {
                 return None;
             }
             if rim_px < SHORT_STEP_PX {

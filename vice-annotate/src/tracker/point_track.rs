@@ -173,13 +173,14 @@ impl PointTrack {
         let mut outcome = Outcome::Tracked;
         let [largest, smallest] = warp.scales();
         let changed = largest > 1.4 || smallest < 0.7 || correlation < 0.93;
-        if changed && confidence > 0.6 {
-            if let Some(template) = Template::cut(next.base(), warp.at) {
-                self.template = template;
-                self.warp.linear = Matrix2::identity();
-                self.refreshes += 1;
-                outcome = Outcome::Refreshed;
-            }
+        if changed
+            && confidence > 0.6
+            && let Some(template) = Template::cut(next.base(), warp.at)
+        {
+            self.template = template;
+            self.warp.linear = Matrix2::identity();
+            self.refreshes += 1;
+            outcome = Outcome::Refreshed;
         }
         Step { px: warp.at, confidence, outcome }
     }

@@ -261,9 +261,9 @@ impl Patch {
         let (mut xx, mut xy, mut yy) = (zero, zero, zero);
         for (right, down) in self.right.chunks_exact(LANES).zip(self.down.chunks_exact(LANES)) {
             let (right, down) = (f32x8::from_slice(simd, right), f32x8::from_slice(simd, down));
-            xx = xx + right * right;
-            xy = xy + right * down;
-            yy = yy + down * down;
+            xx += right * right;
+            xy += right * down;
+            yy += down * down;
         }
         [sum(xx), sum(xy), sum(yy)]
     }
@@ -285,8 +285,8 @@ impl Patch {
                 let lanes = part * LANES..(part + 1) * LANES;
                 let now = upper[part] + (lower[part] - upper[part]) * fy;
                 let more = now - f32x8::from_slice(simd, &value[lanes.clone()]);
-                x[part] = x[part] + more * f32x8::from_slice(simd, &right[lanes.clone()]);
-                y[part] = y[part] + more * f32x8::from_slice(simd, &down[lanes]);
+                x[part] += more * f32x8::from_slice(simd, &right[lanes.clone()]);
+                y[part] += more * f32x8::from_slice(simd, &down[lanes]);
             }
             upper = lower;
         }
