@@ -10,11 +10,13 @@ export class ServerError extends Error {
    * @param {number} status 0 where no answer came
    * @param {string} message
    * @param {string} hint
+   * @param {boolean} stale refused since the labels had changed
    */
-  constructor(status, message, hint) {
+  constructor(status, message, hint, stale = false) {
     super(message);
     this.status = status;
     this.hint = hint;
+    this.stale = stale;
   }
 }
 
@@ -34,10 +36,11 @@ async function send(path, init = {}) {
     throw new ServerError(0, "the server does not answer", "is `vice annotate` still running?");
   }
   if (response.ok) return response;
-  /** @type {{error?: unknown, hint?: unknown}} */
+  /** @type {{error?: unknown, hint?: unknown, revision?: unknown}} */
   const body = await response.json().catch(() => ({}));
   const line = typeof body.error === "string" ? body.error : `the server answers ${response.status}`;
-  throw new ServerError(response.status, line, typeof body.hint === "string" ? body.hint : "");
+  // Only what is stale is told with the revision that holds.
+  throw new ServerError(response.status, line, typeof body.hint === "string" ? body.hint : "", typeof body.revision === "number");
 }
 
 /**

@@ -6,7 +6,6 @@
 
 import { follow, getProjections, getState, postEdits, postHistory, postImport, postTrack, ServerError, stopTrack } from "./api.js";
 
-const STALE = 409;
 const PROJECTIONS_AFTER_MS = 250;
 
 /**
@@ -99,7 +98,7 @@ export class Session {
   async #refused(error) {
     if (!(error instanceof ServerError)) throw error;
     this.labels.hopes.clear();
-    if (error.status === STALE) {
+    if (error.stale) {
       await this.reload().catch(() => undefined);
       this.listener.tell("warning", "Not done: the labels had changed elsewhere first. They have been read again; look, then repeat.");
     } else {
@@ -136,7 +135,7 @@ export class Session {
       } catch (error) {
         // A running tracker raises the revision many times a second. What it did elsewhere is no reason to refuse;
         // where it changed what the user saw, it is.
-        const stale = error instanceof ServerError && error.status === STALE;
+        const stale = error instanceof ServerError && error.stale;
         if (!stale || this.labels.running.length === 0 || tries > 3) throw error;
         this.labels.replace(await getState());
         if (this.labels.touchedBy(edits) !== seen) throw error;
@@ -209,10 +208,6 @@ export class Session {
         await this.#answered(await postImport(format, body));
         return true;
       } catch (error) {
-        if (error instanceof ServerError && error.status === STALE) {
-          this.listener.tell("warning", error.hint ? `${error.message} — ${error.hint}` : error.message);
-          return false;
-        }
         return this.#refused(error);
       }
     });

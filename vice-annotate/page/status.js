@@ -46,6 +46,9 @@ export class Status {
     setText(this.saved, lost ? "No connection" : !app.writable ? "Read only" : busy ? "Saving…" : "All saved");
     this.saved.classList.toggle("busy", busy || !app.writable);
     this.saved.classList.toggle("wrong", lost);
+    if (state.save_problem) {
+      this.notices.banner("save", "warning", `The labels are safe in the journal, but the file is behind: ${state.save_problem}`);
+    } else this.notices.clear("save");
     if (app.writable) this.notices.clear("read-only");
     else {
       const reason = state.read_only_reason ?? "another window writes to this file";

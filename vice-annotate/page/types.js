@@ -45,6 +45,7 @@
  * @property {string} labels_file
  * @property {boolean} writable
  * @property {string | null} read_only_reason
+ * @property {string | null} [save_problem] why the file beside the journal is behind it
  * @property {Frame[]} frames
  * @property {Point[]} points
  * @property {boolean} can_undo
