@@ -52,6 +52,28 @@ test("opens with the first frame, and fits 1280 x 720", async () => {
   }
 });
 
+test("everything that can be worked has a name and can be reached by keyboard", async () => {
+  const nameless = await first.page.evaluate(() =>
+    [...document.querySelectorAll("button, input, select, summary, canvas[tabindex]")]
+      .filter((each) => each instanceof HTMLElement && each.checkVisibility())
+      .filter((each) => {
+        const labels = each instanceof HTMLInputElement || each instanceof HTMLSelectElement ? [...(each.labels ?? [])] : [];
+        const name = each.getAttribute("aria-label") ?? (labels.map((label) => label.textContent).join("") || each.textContent);
+        return !name?.trim() || (each instanceof HTMLElement && each.tabIndex < 0);
+      })
+      .map((each) => each.outerHTML));
+  assert.deepEqual(nameless, []);
+  const reached = new Set();
+  for (let step = 0; step < 60; step += 1) {
+    await first.press("Tab");
+    reached.add(await first.page.evaluate(() => document.activeElement?.id || document.activeElement?.getAttribute("data-action")));
+  }
+  for (const id of ["marks", "timeline", "retrack", "suggest", "brightness", "play", "speed", "frame", "zoom-fit"]) {
+    assert.ok(reached.has(id), `${id} is reached: ${[...reached].join(" ")}`);
+  }
+  await first.page.focus("#marks");
+});
+
 test("four points are placed: by clicks, by the keyboard alone, and from a suggestion", async () => {
   const { page } = first;
   const state = await server.state();
@@ -236,6 +258,19 @@ test("zoom goes to the pointer, brightness and inversion change the picture only
   assert.equal((await server.state()).revision, before.revision);
 });
 
+test("names are shown as text, whatever they hold", async () => {
+  const { page } = first;
+  const name = "<img src=x>&amp;";
+  await first.press("3");
+  await page.fill("#name", name);
+  await first.press("Enter");
+  await server.until("point 3 has its new name", ({ points }) => points.some((each) => each.name === name));
+  await page.locator("#points b", { hasText: name }).waitFor();
+  assert.equal(await page.locator("img").count(), 0);
+  await first.press("Control+z");
+  await server.until("it has its old name again", ({ points }) => points.some((each) => each.name === "3"));
+});
+
 test("a reload shows the same labels", async () => {
   const before = await server.state();
   await first.page.reload();
@@ -274,6 +309,27 @@ test("a second window follows the first, and its stale write is refused", async 
   assert.equal(refused.status, 409);
 });
 
+test("a second program on the same file may only look", async () => {
+  const other = await Server.start(dataset, labels);
+  const window = await Window.open(chromium, other);
+  await window.told("Read only");
+  const before = await server.state();
+  assert.equal((await other.state()).writable, false);
+  const { x, y } = await window.place({ u: 250, v: 100 }, before);
+  await window.page.mouse.click(x, y);
+  await window.press("d");
+  assert.ok(await window.page.getByRole("button", { name: "Undo" }).isDisabled());
+  await window.screenshot("8-read-only");
+  const refused = await other.request("/api/edits", {
+    method: "POST",
+    body: JSON.stringify({ revision: (await other.state()).revision, edits: [{ op: "delete", point: "1", frame: 0 }] }),
+  });
+  assert.equal(refused.status, 403);
+  assert.deepEqual((await server.state()).points, before.points);
+  await window.close();
+  await other.end();
+});
+
 test("without the right token there is nothing", async () => {
   for (const url of [server.origin, `${server.origin}/?token=wrong`, `${server.origin}/main.js`, `${server.origin}/api/state?token=wrong`]) {
     assert.equal((await fetch(url)).status, 401, url);
@@ -293,11 +349,11 @@ test("killed and started again it has every label, and says when it is gone", as
     observation(state, "1", 2)?.source === "manual" && state.jobs.every((job) => job.state !== "running"));
   await server.end("SIGKILL");
   await first.told("The server");
-  await first.screenshot("8-server-gone");
+  await first.screenshot("9-server-gone");
   server = await Server.start(dataset, labels);
   const after = await server.state();
   assert.deepEqual(after.points, before.points);
   await first.goto(server);
   await first.page.waitForFunction((count) => document.querySelectorAll("#points li").length === count, before.points.length);
-  await first.screenshot("9-opened-again");
+  await first.screenshot("10-opened-again");
 });
