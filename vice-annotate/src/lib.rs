@@ -1,6 +1,22 @@
 //! Labels in minutes: a point is placed once, the image tracker carries it through the flight, and a person corrects
 //! what it doubts.
+//!
+//! | module | what |
+//! | --- | --- |
+//! | [`tracker`] | where a point of one frame is in the next ones |
+//! | [`store`] | the labels while they are edited: journal, undo, the file |
+//! | [`jobs`] | tracking in the background |
+//! | [`estimates`] | what pose streams and depth add |
+//! | [`suggest`] | where to put new points |
+//! | [`exchange`] | labels from and for other tools |
+//! | [`server`] | all of this for a page in the browser |
 #![forbid(unsafe_code)]
 
+pub mod desk;
+pub mod estimates;
+pub mod exchange;
+pub mod jobs;
+pub mod server;
+pub mod store;
 pub mod suggest;
 pub mod tracker;

@@ -36,6 +36,8 @@ pub(crate) enum Command {
     Evaluate(Box<commands::evaluate::Args>),
     /// Compare two trajectories: APE, RPE, RMSE_3D, AOE, ROE.
     Trajectory(commands::trajectory::Args),
+    /// Label key points in the browser, by hand and with a tracker.
+    Annotate(Box<commands::annotate::Args>),
     /// Show what a data set holds.
     Info(commands::info::Args),
     /// List the data set formats.

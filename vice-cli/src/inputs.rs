@@ -1,11 +1,13 @@
 //! From options to what the pipeline takes. Shared by all commands that evaluate.
 
 mod depth;
+mod estimates;
 mod open;
 mod outputs;
 mod streams;
 
 pub(crate) use depth::{AnchorArgs, DepthArgs, Scene};
+pub(crate) use estimates::SceneEstimates;
 pub(crate) use open::{DatasetArgs, split_list};
 pub(crate) use outputs::Outputs;
 pub(crate) use streams::{StreamArgs, load_streams};
@@ -13,7 +15,7 @@ pub(crate) use streams::{StreamArgs, load_streams};
 use std::path::PathBuf;
 
 use anyhow::Context;
-use vice_core::evaluate::Window;
+use vice_core::evaluate::{Observations, Window};
 use vice_core::time::Span;
 
 /// Labels and the part of the run that is evaluated.
@@ -26,6 +28,9 @@ pub(crate) struct LabelArgs {
     /// Only these points.
     #[arg(long, value_name = "NAME,...")]
     pub(crate) points: Vec<String>,
+    /// Whose labels count: all, or only those that a human placed.
+    #[arg(long, value_name = "manual|all", default_value = "all")]
+    pub(crate) observations: Observations,
     /// Keep the frame nearest to each tick of this rate, and every key frame [default: every labelled frame].
     #[arg(long, value_name = "HZ", value_parser = positive)]
     pub(crate) fps: Option<f64>,
@@ -39,7 +44,7 @@ pub(crate) struct LabelArgs {
 
 impl LabelArgs {
     pub(crate) fn window(&self) -> Window {
-        Window { fps: self.fps, start: self.start, duration: self.duration }
+        Window { fps: self.fps, start: self.start, duration: self.duration, observations: self.observations }
     }
 
     /// The labels, or those of the chosen points.

@@ -23,6 +23,7 @@ fn main() -> ExitCode {
     let verbosity = terminal::Verbosity::new(cli.quiet, cli.verbose);
     terminal::show_warnings(verbosity);
     let outcome = match &cli.command {
+        Command::Annotate(args) => commands::annotate::run(args, verbosity),
         Command::Demo(args) => commands::demo::run(args, verbosity),
         Command::Evaluate(args) => commands::evaluate::run(args, verbosity),
         Command::Trajectory(args) => commands::trajectory::run(args),

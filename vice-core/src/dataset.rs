@@ -52,6 +52,14 @@ pub trait Dataset: Send + Sync {
     /// [`DataError`] if the index is out of range or the image cannot be decoded.
     fn image(&self, camera: &str, index: usize) -> DataResult<Image>;
 
+    /// The stored file of one image, where it is a PNG or JPEG of its own: a browser shows it without decoding here.
+    ///
+    /// # Errors
+    /// [`DataError`] if the index is out of range or the file cannot be read.
+    fn image_file(&self, _camera: &str, _index: usize) -> DataResult<Option<Vec<u8>>> {
+        Ok(None)
+    }
+
     /// Pose of the camera in the body at a stamp: a function of time, since heads pan and tilt.
     ///
     /// # Errors

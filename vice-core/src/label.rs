@@ -44,6 +44,17 @@ impl ObservationSource {
     }
 }
 
+/// What a machine that made an observation says of its work; empty where a human made it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Provenance {
+    /// How sure it is, 0 to 1.
+    pub confidence: Option<f64>,
+    /// Version of the image tracker.
+    pub tracker_version: Option<u32>,
+    /// A pose stream said where to start looking. The image decided where the point is.
+    pub seeded: bool,
+}
+
 /// One point in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
@@ -59,6 +70,8 @@ pub struct Observation {
     pub occluded: bool,
     /// The annotator is not sure: scored, and shown as such.
     pub uncertain: bool,
+    /// What the machine that made it says.
+    pub provenance: Provenance,
     /// The line of the file it came from, counted from 1; 0 where there is none.
     pub line: u64,
 }
@@ -124,6 +137,18 @@ pub enum LabelError {
         /// Line of the second one, 0 where there is none.
         line: u64,
     },
+    /// A confidence is no number from 0 to 1.
+    #[error("point {point} at {stamp} ns has the confidence {confidence}, which is not between 0 and 1")]
+    Confidence {
+        /// The point.
+        point: String,
+        /// The frame.
+        stamp: Stamp,
+        /// The value.
+        confidence: f64,
+        /// Line of the file, 0 where there is none.
+        line: u64,
+    },
     /// A point has no name.
     #[error("a point at {stamp} ns has an empty name")]
     NoName {
@@ -138,7 +163,10 @@ impl LabelError {
     /// Line of the file at fault, where known.
     pub const fn line(&self) -> Option<u64> {
         match self {
-            Self::NotFinite { line, .. } | Self::Duplicate { line, .. } | Self::NoName { line, .. } => {
+            Self::NotFinite { line, .. }
+            | Self::Duplicate { line, .. }
+            | Self::Confidence { line, .. }
+            | Self::NoName { line, .. } => {
                 if *line == 0 {
                     None
                 } else {
@@ -159,6 +187,7 @@ impl Observation {
             keyframe: false,
             occluded: false,
             uncertain: false,
+            provenance: Provenance { confidence: None, tracker_version: None, seeded: false },
             line: 0,
         }
     }
@@ -194,7 +223,8 @@ impl LabelSet {
     /// Labels from rows in any order; points are sorted by name in natural order (2 before 10), observations by stamp.
     ///
     /// # Errors
-    /// [`LabelError`] for a pixel that is not finite, an empty name, or a point labelled twice in a frame.
+    /// [`LabelError`] for a pixel that is not finite, a confidence that is none, an empty name, or a point labelled twice
+    /// in a frame.
     pub fn from_rows(rows: impl IntoIterator<Item = LabelRow>) -> Result<Self, LabelError> {
         let mut points: BTreeMap<NaturalName, Vec<Observation>> = BTreeMap::new();
         for LabelRow { point, observation } in rows {
@@ -204,6 +234,9 @@ impl LabelSet {
             }
             if !(observation.px.u.is_finite() && observation.px.v.is_finite()) {
                 return Err(LabelError::NotFinite { point, stamp, line });
+            }
+            if let Some(confidence) = observation.provenance.confidence.filter(|c| !(0.0..=1.0).contains(c)) {
+                return Err(LabelError::Confidence { point, stamp, confidence, line });
             }
             points.entry(NaturalName::new(point)).or_default().push(observation);
         }

@@ -189,7 +189,8 @@ pub struct TrajectoryPart {
 }
 
 impl ResultDocument {
-    /// Largest share of labels that could not be scored, over all parts, in percent; marks by a human do not count.
+    /// Largest share of labels that could not be scored, over all parts, in percent. What a human left out, by a mark or by asking for
+    /// manual labels only, does not count.
     pub fn worst_skipped_percent(&self) -> f64 {
         self.pixel.iter().map(PixelPart::skipped_percent).fold(0.0, f64::max)
     }
@@ -201,7 +202,8 @@ impl PixelPart {
         if self.scored == 0 {
             return 100.0;
         }
-        let skipped = self.skipped.iter().filter(|s| s.reason != crate::evaluate::OCCLUDED).count() as f64;
+        let wanted = [crate::evaluate::OCCLUDED, crate::evaluate::NOT_MANUAL];
+        let skipped = self.skipped.iter().filter(|s| !wanted.contains(&s.reason.as_str())).count() as f64;
         100.0 * skipped / (skipped + self.scored as f64)
     }
 

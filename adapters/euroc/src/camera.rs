@@ -35,6 +35,10 @@ impl EurocCamera {
     pub(crate) fn image(&self, index: usize) -> DataResult<Image> {
         image_file::read(self.listing()?.path(index)?)
     }
+
+    pub(crate) fn image_file(&self, index: usize) -> DataResult<Vec<u8>> {
+        image_file::read_bytes(self.listing()?.path(index)?)
+    }
 }
 
 /// Gives what is there or reads it; two threads that read at once keep the first result. Errors are not kept, since

@@ -134,6 +134,10 @@ impl Dataset for Sequence {
         self.find(camera)?.image(index)
     }
 
+    fn image_file(&self, camera: &str, index: usize) -> DataResult<Option<Vec<u8>>> {
+        self.find(camera)?.image_file(index).map(Some)
+    }
+
     fn body_from_camera(&self, camera: &str, _stamp: Stamp) -> DataResult<BodyFromCamera> {
         Ok(self.find(camera)?.calibration()?.body_from_camera)
     }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use vice_core::depth::DepthSource;
-use vice_core::evaluate::{EvaluateError, Evaluation, Selection, evaluate};
+use vice_core::evaluate::{EvaluateError, Evaluation, Observations, Selection, evaluate};
 use vice_core::metrics::align::Alignment;
 use vice_core::result::{ResultDocument, Settings};
 
@@ -220,6 +220,9 @@ fn other_settings(args: &Args) -> std::collections::BTreeMap<String, String> {
     if !args.scoring.subsets.is_empty() {
         let sizes: Vec<String> = args.scoring.subsets.iter().map(u16::to_string).collect();
         other.insert("subsets".to_string(), sizes.join(","));
+    }
+    if args.labels.observations != Observations::All {
+        other.insert("observations".to_string(), args.labels.observations.name().to_string());
     }
     if let Some(voxel_m) = args.depth_options.cloud_voxel {
         other.insert("cloud-voxel".to_string(), voxel_m.to_string());

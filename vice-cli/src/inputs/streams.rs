@@ -25,7 +25,7 @@ use crate::terminal::usage;
 pub(crate) const IMU_EULER: &str = "imu-euler";
 
 /// Which pose streams are evaluated, and how their poses are read.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Pose streams")]
 pub(crate) struct StreamArgs {
     /// Estimates to evaluate: names of streams, imu-euler, or files.
@@ -81,7 +81,8 @@ pub(crate) fn load_streams(
         }
         list.push(stream);
     }
-    if list.iter().all(|s| s.role == Role::Reference) {
+    // A command that does not ask for estimates may do with the reference.
+    if !args.estimate.is_empty() && list.iter().all(|s| s.role == Role::Reference) {
         return Err(usage("--estimate: no estimate is named"));
     }
     let anchor = loader.anchor(&mut list)?;

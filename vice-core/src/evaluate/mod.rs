@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-pub use select::{SelectedKeyframe, Selection, Window};
+pub use select::{Observations, SelectedKeyframe, Selection, Window};
 pub use streams::Stream;
 
 use crate::camera::{Camera, Pixel, ProjectError};
@@ -36,6 +36,9 @@ use crate::trajectory::NoPose;
 /// The reason of labels that a human marked as hidden: not scored, and not counted against the run.
 pub const OCCLUDED: &str = "occluded";
 
+/// The reason of labels that a machine made where only manual ones were asked for: not counted against the run either.
+pub const NOT_MANUAL: &str = "not-manual";
+
 /// Why a label was not scored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
@@ -48,6 +51,10 @@ pub enum SkipReason {
     BeforeFirstKeyframe,
     /// A human marked it as hidden.
     Occluded,
+    /// A machine made it, and only manual labels were asked for.
+    NotManual,
+    /// A machine made its key frame, and only manual labels were asked for.
+    KeyframeNotManual,
     /// The stream has no pose at its key frame.
     KeyframeGap,
     /// Its frame lies in too wide a gap of the stream.
@@ -74,6 +81,8 @@ impl SkipReason {
             Self::KeyframeNoFrame => "keyframe-no-frame",
             Self::BeforeFirstKeyframe => "before-first-keyframe",
             Self::Occluded => OCCLUDED,
+            Self::NotManual => NOT_MANUAL,
+            Self::KeyframeNotManual => "keyframe-not-manual",
             Self::KeyframeGap => "keyframe-gap",
             Self::FrameGap => "frame-gap",
             Self::BeforeStream => "before-stream",
@@ -159,6 +168,9 @@ pub enum EvaluateError {
     /// No point has a key frame.
     #[error("no label is marked as a key frame, so that there is nothing to carry along")]
     NoKeyframe,
+    /// No key frame is manual.
+    #[error("no key frame is manual, so that no manual label can be scored by itself (see --observations)")]
+    NoManualKeyframe,
     /// More points are asked for than there are.
     #[error("subsets of {asked} points were asked for, but there are {points} points")]
     SubsetTooLarge {

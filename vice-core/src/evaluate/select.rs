@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{EvaluateError, SkipReason};
 use crate::camera::Camera;
-use crate::label::{LabelSet, Observation};
+use crate::label::{LabelSet, Observation, ObservationSource};
 use crate::time::{Span, Stamp};
 use crate::time_unit::mixed_up;
 
@@ -18,6 +18,57 @@ pub struct Window {
     pub start: Span,
     /// Counts from `start`; `None` to the end.
     pub duration: Option<Span>,
+    /// Whose labels count.
+    pub observations: Observations,
+}
+
+/// Whose labels count.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Observations {
+    /// All, whoever made them.
+    #[default]
+    All,
+    /// Only those that a human placed: no number depends on another one. A segment whose key frame a machine made is
+    /// left out as a whole, since what its point is would be the machine's word.
+    Manual,
+}
+
+impl Observations {
+    /// The name in options and documents.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::All => "all",
+            Self::Manual => "manual",
+        }
+    }
+
+    fn count(self, observation: &Observation) -> bool {
+        self == Self::All || observation.source == ObservationSource::Manual
+    }
+}
+
+impl std::str::FromStr for Observations {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "all" => Ok(Self::All),
+            "manual" => Ok(Self::Manual),
+            _ => Err("expected manual or all".to_string()),
+        }
+    }
+}
+
+impl Window {
+    /// Indices of the frames that the window keeps, ascending.
+    pub fn frames(&self, frames: &[Stamp]) -> Vec<usize> {
+        if frames.is_empty() {
+            return vec![];
+        }
+        let kept = KeptFrames::new(frames, self);
+        (0..frames.len()).filter(|i| kept.covers(frames[*i]) && kept.has(*i)).collect()
+    }
 }
 
 /// A label and the index of its frame.
@@ -118,11 +169,17 @@ impl<'a> Selection<'a> {
                     match (frame, keyframe) {
                         (None, _) => selected.skips.push((observation.stamp, SkipReason::NoFrame)),
                         (Some(frame), _) if !kept.has(frame) => {}
+                        (Some(_), _) if !window.observations.count(observation) => {
+                            selected.skips.push((observation.stamp, SkipReason::NotManual));
+                        }
                         (Some(_), None) => {
                             selected.skips.push((observation.stamp, SkipReason::KeyframeNoFrame))
                         }
                         (Some(_), _) if observation.occluded => {
                             selected.skips.push((observation.stamp, SkipReason::Occluded));
+                        }
+                        (Some(_), _) if !window.observations.count(segment.keyframe) => {
+                            selected.skips.push((observation.stamp, SkipReason::KeyframeNotManual));
                         }
                         (Some(frame), Some(_)) => samples.push(Matched { observation, frame }),
                     }
@@ -133,7 +190,9 @@ impl<'a> Selection<'a> {
                     }
                     continue;
                 };
-                if samples.is_empty() && !kept.covers(segment.keyframe.stamp) {
+                if samples.is_empty()
+                    && !(kept.covers(segment.keyframe.stamp) && window.observations.count(segment.keyframe))
+                {
                     continue;
                 }
                 used.insert(frame);
@@ -148,8 +207,17 @@ impl<'a> Selection<'a> {
         }
         selection.frames = used.into_iter().collect();
         if selection.frames.is_empty() {
-            let windowed = *window != Window::default();
-            return Err(if windowed { EvaluateError::EmptyWindow } else { EvaluateError::NoKeyframe });
+            let mut keyframes =
+                labels.points().iter().flat_map(|p| &p.observations).filter(|o| o.keyframe).peekable();
+            if keyframes.peek().is_some() && !keyframes.any(|o| window.observations.count(o)) {
+                return Err(EvaluateError::NoManualKeyframe);
+            }
+            let all = Window { observations: Observations::All, ..*window };
+            return Err(if all != Window::default() {
+                EvaluateError::EmptyWindow
+            } else {
+                EvaluateError::NoKeyframe
+            });
         }
         selection.in_window = selection.frames.iter().copied().filter(|f| kept.covers(frames[*f])).collect();
         Ok(selection)
@@ -269,7 +337,7 @@ mod tests {
     fn kept(millis: &[i64], fps: f64, duration_ms: Option<i64>) -> Vec<usize> {
         let frames: Vec<Stamp> = millis.iter().map(|m| Stamp::from_nanos(m * 1_000_000)).collect();
         let window =
-            Window { fps: Some(fps), start: Span::ZERO, duration: duration_ms.map(Span::from_millis) };
+            Window { fps: Some(fps), duration: duration_ms.map(Span::from_millis), ..Window::default() };
         KeptFrames::new(&frames, &window).ticked.unwrap().into_iter().collect()
     }
 
@@ -281,6 +349,9 @@ mod tests {
         // Ticks at 0, 100, 200 ...: 130 is nearest to 100, 180 to 200, and 500 to those from 340 on.
         assert_eq!(kept(&[0, 60, 130, 180, 500], 10.0, None), [0, 2, 3, 4]);
         assert_eq!(kept(&[0], 10.0, None), [0]);
+        let window = Window { start: Span::from_nanos(90), fps: None, ..Window::default() };
+        assert_eq!(window.frames(&[0, 100, 200].map(Stamp::from_nanos)), [1, 2]);
+        assert_eq!(Window::default().frames(&[]), [0_usize; 0]);
         // Faster than the frames: all are kept.
         assert_eq!(kept(&[0, 10, 20, 33], 1000.0, None), [0, 1, 2, 3]);
     }

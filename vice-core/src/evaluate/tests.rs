@@ -9,7 +9,7 @@ use super::*;
 use crate::camera::Model;
 use crate::dataset::Image;
 use crate::frames::{Rigid, World, WorldFromBody};
-use crate::label::{LabelRow, LabelSet, Observation};
+use crate::label::{LabelRow, LabelSet, Observation, ObservationSource};
 use crate::result::Role;
 use crate::trajectory::{Trajectory, in_other_world};
 
@@ -255,8 +255,12 @@ fn what_cannot_be_evaluated_says_why() {
 fn a_window_keeps_its_key_frames() {
     let labels = labels(&flyer());
     let streams = [stream(Role::Estimate, exact())];
-    let window =
-        Window { fps: Some(10.0), start: Span::from_millis(500), duration: Some(Span::from_millis(200)) };
+    let window = Window {
+        fps: Some(10.0),
+        start: Span::from_millis(500),
+        duration: Some(Span::from_millis(200)),
+        ..Window::default()
+    };
     let part = &run(&labels, &streams, window).unwrap().pixel[0];
     // Frames 10, 12 and 14, scored against the key frame 0 that lies before the window.
     assert_eq!((part.scored, part.keyframes.len()), (12, 4));
@@ -303,4 +307,34 @@ proptest! {
         let (here, there) = (errors(noisy.clone()), errors(in_other_world(&moved, &noisy)));
         prop_assert!((here.0 - there.0).abs() < 1e-6 && (here.1 - there.1).abs() < 1e-9, "{:?} {:?}", here, there);
     }
+}
+
+#[test]
+fn manual_labels_are_scored_without_a_word_of_a_machine() {
+    let mut rows: Vec<LabelRow> = Vec::new();
+    for point in labels(&flyer()).points() {
+        for (i, observation) in point.observations.iter().enumerate() {
+            let mut observation = *observation;
+            // Every other label is the tracker's; of point 3 also the second key frame.
+            if i % 2 == 1 || (point.name == "3" && i == 20) {
+                observation.source = ObservationSource::Auto;
+            }
+            rows.push(LabelRow { point: point.name.clone(), observation });
+        }
+    }
+    let labels = LabelSet::from_rows(rows.clone()).unwrap();
+    let streams = [stream(Role::Estimate, exact())];
+    let manual = Window { observations: Observations::Manual, ..Window::default() };
+    let part = &run(&labels, &streams, manual).unwrap().pixel[0];
+    // Nine manual ones follow each of seven manual key frames, and one that is not.
+    assert_eq!((part.scored, part.keyframes.len()), (7 * 9, 7));
+    let reasons: Vec<(&str, usize)> = part.skips_by_reason().into_iter().collect();
+    assert_eq!(reasons, [("keyframe-not-manual", 9), ("not-manual", 8 * 10)]);
+    assert!((part.skipped_percent() - 100.0 * 9.0 / 72.0).abs() < 1e-9, "{}", part.skipped_percent());
+    assert_eq!(run(&labels, &streams, Window::default()).unwrap().pixel[0].scored, 4 * 38);
+    for row in &mut rows {
+        row.observation.source = ObservationSource::Auto;
+    }
+    let error = run(&LabelSet::from_rows(rows).unwrap(), &streams, manual).unwrap_err();
+    assert!(matches!(error, EvaluateError::NoManualKeyframe));
 }

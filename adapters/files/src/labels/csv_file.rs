@@ -56,7 +56,8 @@ impl Lines<'_> {
     }
 }
 
-/// Writes all columns, points in natural order, observations in time order.
+/// Writes all columns, points in natural order, observations in time order. What a tracker says of its work
+/// ([`vice_core::label::Provenance`]) has no column: JSON keeps it.
 ///
 /// # Errors
 /// [`io::Error`] of the writer.
@@ -155,7 +156,8 @@ impl Columns {
             }
         }
         let px = Pixel::new(number(self.u_px, "u_px")?, number(self.v_px, "v_px")?);
-        let observation = Observation { stamp, px, source, keyframe, occluded, uncertain, line };
+        let observation =
+            Observation { source, keyframe, occluded, uncertain, line, ..Observation::manual(stamp, px) };
         Ok(LabelRow { point: field(self.point).to_string(), observation })
     }
 }

@@ -7,18 +7,19 @@
 //!      "occluded": false, "uncertain": false}]}]}
 //! ```
 //!
-//! `dataset` and `camera` may be missing; so may everything of an observation but its stamp and pixel. Fields that are
-//! not known are passed over, so that a file may carry more.
+//! `dataset` and `camera` may be missing; so may everything of an observation but its stamp and pixel. An observation that
+//! a machine made may also carry `confidence` (0 to 1), `tracker_version` and `seeded`. Fields that are not known are
+//! passed over, so that a file may carry more.
 
 use std::io::{self, Write};
 
 use serde::{Deserialize, Serialize};
 use vice_core::camera::Pixel;
 use vice_core::error::{DataError, DataResult};
-use vice_core::label::{LabelRow, LabelSet, Observation, ObservationSource};
+use vice_core::label::{LabelRow, LabelSet, Observation, ObservationSource, Provenance};
 use vice_core::time::Stamp;
 
-use super::labels_from;
+use super::{no_labels, validated};
 
 /// Name and version of the schema written, the newest that is read.
 pub const LABELS_SCHEMA: &str = "vice.labels/1";
@@ -58,6 +59,12 @@ struct ObservationDocument {
     occluded: bool,
     #[serde(default)]
     uncertain: bool,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    confidence: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    tracker_version: Option<u32>,
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    seeded: bool,
 }
 
 /// Reads a document of schema `vice.labels/1`.
@@ -65,6 +72,15 @@ struct ObservationDocument {
 /// # Errors
 /// [`DataError`] with the line if it is no such JSON, of another or a newer schema, and as [`LabelSet::from_rows`].
 pub fn read_json(bytes: &[u8]) -> DataResult<LabelSet> {
+    let labels = read_json_or_none(bytes)?;
+    if labels.points().is_empty() { Err(no_labels()) } else { Ok(labels) }
+}
+
+/// As [`read_json`], but a document may hold no points: that is how an annotator begins.
+///
+/// # Errors
+/// As [`read_json`], except for a document without labels.
+pub fn read_json_or_none(bytes: &[u8]) -> DataResult<LabelSet> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let head: Head = serde_json::from_slice(bytes).map_err(|e| json_error(&e))?;
     check_schema(head.schema.as_deref())?;
@@ -79,11 +95,16 @@ pub fn read_json(bytes: &[u8]) -> DataResult<LabelSet> {
                 keyframe: o.keyframe,
                 occluded: o.occluded,
                 uncertain: o.uncertain,
+                provenance: Provenance {
+                    confidence: o.confidence,
+                    tracker_version: o.tracker_version,
+                    seeded: o.seeded,
+                },
                 line: 0,
             },
         })
     });
-    let mut labels = labels_from(rows.collect())?;
+    let mut labels = validated(rows.collect())?;
     labels.dataset = document.dataset;
     labels.camera = document.camera;
     Ok(labels)
@@ -106,6 +127,9 @@ pub fn write_json(writer: &mut dyn Write, labels: &LabelSet) -> io::Result<()> {
                 source: o.source,
                 occluded: o.occluded,
                 uncertain: o.uncertain,
+                confidence: o.provenance.confidence,
+                tracker_version: o.provenance.tracker_version,
+                seeded: o.provenance.seeded,
             })
             .collect(),
     });

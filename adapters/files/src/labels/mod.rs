@@ -4,9 +4,11 @@
 //! | --- | --- |
 //! | CSV | `point,timestamp_ns,u_px,v_px,keyframe` and optionally `source,flags`: the interchange form |
 //! | JSON | schema `vice.labels/1`, which also names the data set and the camera |
+//! | CVAT | XML of the annotation tool CVAT, tracks of points; where the annotator imports and exports |
 //! | pickle | `{point: {frame index: (array([x, y]), is_keyframe)}}`, as the paper's authors stored them; read only |
 
 mod csv_file;
+mod cvat;
 mod json_file;
 mod ndarray;
 mod pickle;
@@ -22,7 +24,8 @@ use vice_core::label::{LabelError, LabelRow, LabelSet};
 use vice_core::time::Stamp;
 
 pub use csv_file::{read_csv, write_csv};
-pub use json_file::{LABELS_SCHEMA, read_json, write_json};
+pub use cvat::{read_cvat, write_cvat};
+pub use json_file::{LABELS_SCHEMA, read_json, read_json_or_none, write_json};
 pub use pickle::read_pickle;
 
 use crate::atomic::{self, Overwrite};
@@ -104,9 +107,15 @@ pub fn write(path: impl AsRef<Path>, labels: &LabelSet, overwrite: Overwrite) ->
 
 /// Rows as a validated set, with the line of the one at fault.
 fn labels_from(rows: Vec<LabelRow>) -> DataResult<LabelSet> {
-    if rows.is_empty() {
-        return Err(DataError::new("the file holds no labels"));
-    }
+    if rows.is_empty() { Err(no_labels()) } else { validated(rows) }
+}
+
+fn no_labels() -> DataError {
+    DataError::new("the file holds no labels")
+}
+
+/// Rows, if there are any, as a validated set.
+fn validated(rows: Vec<LabelRow>) -> DataResult<LabelSet> {
     LabelSet::from_rows(rows).map_err(|e: LabelError| {
         let error = DataError::new(e.to_string());
         match e.line() {

@@ -2,7 +2,7 @@
 
 use vice_core::camera::Pixel;
 use vice_core::error::{DataError, DataResult};
-use vice_core::label::{LabelRow, LabelSet, Observation, ObservationSource};
+use vice_core::label::{LabelRow, LabelSet, Observation};
 use vice_core::time::Stamp;
 
 use super::labels_from;
@@ -48,15 +48,7 @@ pub fn read_pickle(bytes: &[u8], frame_stamps: &[Stamp]) -> DataResult<LabelSet>
                 ))
                 .hint("is this the data set that was labelled?")
             })?;
-            let observation = Observation {
-                stamp,
-                px,
-                source: ObservationSource::Manual,
-                keyframe,
-                occluded: false,
-                uncertain: false,
-                line: 0,
-            };
+            let observation = Observation { keyframe, ..Observation::manual(stamp, px) };
             rows.push(LabelRow { point: point.clone(), observation });
         }
     }

@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 use vice_core::camera::Pixel;
 use vice_core::error::Place;
-use vice_core::label::{Observation, ObservationSource};
+use vice_core::label::{Observation, ObservationSource, Provenance};
 
 use super::*;
 
@@ -91,6 +91,12 @@ fn schemas_are_told_apart() {
     says(r#"{"schema": "vice.labels/x"}"#, "not `vice.labels/1`");
     says(r#"{"points": []}"#, "no `schema`");
     says(r#"{"schema": "vice.labels/1", "points": []}"#, "no labels");
+    let none = r#"{"schema": "vice.labels/1", "camera": "cam0", "points": []}"#;
+    assert_eq!(read_json_or_none(none.as_bytes()).unwrap().camera.as_deref(), Some("cam0"));
+    says(
+        r#"{"schema": "vice.labels/1", "points": [{"name": "0", "observations": [{"timestamp_ns": 5, "px": [1, 2], "confidence": 1.5}]}]}"#,
+        "not between 0 and 1",
+    );
     says("{\"schema\": \"vice.labels/1\",\n \"points\": [{}]}", "line 2: ");
     says("{", "is not the JSON expected");
     says(
@@ -199,6 +205,11 @@ fn nothing_in_a_pickle_is_run() {
     assert!(error.contains("more labels than it has bytes"), "{error}");
 }
 
+fn any_provenance() -> impl Strategy<Value = Provenance> {
+    (prop::option::of(0.0..=1.0_f64), prop::option::of(any::<u32>()), any::<bool>())
+        .prop_map(|(confidence, tracker_version, seeded)| Provenance { confidence, tracker_version, seeded })
+}
+
 fn any_labels() -> impl Strategy<Value = LabelSet> {
     let source = prop::sample::select(vec![
         ObservationSource::Manual,
@@ -206,26 +217,30 @@ fn any_labels() -> impl Strategy<Value = LabelSet> {
         ObservationSource::Detected,
         ObservationSource::Interpolated,
     ]);
-    let observation = ((0..50_i64), (-1e4..1e4_f64), (-1e4..1e4_f64), source, any::<[bool; 3]>());
+    let observation =
+        ((0..50_i64), (-1e4..1e4_f64), (-1e4..1e4_f64), source, any::<[bool; 3]>(), any_provenance());
     let row =
-        ("[^\\s#][^\\s]{0,4}", observation).prop_map(|(point, (at, u, v, source, [k, o, n]))| LabelRow {
-            point,
-            observation: Observation {
-                stamp: Stamp::from_nanos(1_403_715_273_262_142_976 + at),
-                px: Pixel::new(u, v),
-                source,
-                keyframe: k,
-                occluded: o,
-                uncertain: n,
-                line: 0,
-            },
+        ("[^\\s#][^\\s]{0,4}", observation).prop_map(|(point, (at, u, v, source, [k, o, n], provenance))| {
+            LabelRow {
+                point,
+                observation: Observation {
+                    stamp: Stamp::from_nanos(1_403_715_273_262_142_976 + at),
+                    px: Pixel::new(u, v),
+                    source,
+                    keyframe: k,
+                    occluded: o,
+                    uncertain: n,
+                    provenance,
+                    line: 0,
+                },
+            }
         });
     prop::collection::vec(row, 1..20)
         .prop_filter_map("a point is labelled once a frame", |rows| LabelSet::from_rows(rows).ok())
 }
 
 fn without_lines(labels: &LabelSet) -> Vec<(String, Vec<Observation>)> {
-    let bare = |o: &Observation| Observation { line: 0, ..*o };
+    let bare = |o: &Observation| Observation { line: 0, provenance: Provenance::default(), ..*o };
     labels.points().iter().map(|p| (p.name.clone(), p.observations.iter().map(bare).collect())).collect()
 }
 

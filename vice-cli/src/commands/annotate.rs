@@ -1,0 +1,142 @@
+//! `vice annotate`: labels in the browser.
+
+use std::collections::BTreeMap;
+use std::net::{IpAddr, Ipv4Addr};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+
+use anyhow::Context;
+use vice_annotate::desk::Desk;
+use vice_annotate::estimates::Estimates;
+use vice_annotate::server::{ServerOptions, serve};
+use vice_annotate::store::{Store, Target};
+use vice_core::evaluate::Window;
+use vice_core::time::Span;
+
+use crate::inputs::{DatasetArgs, DepthArgs, SceneEstimates, StreamArgs, positive, span_not_negative};
+use crate::terminal::{self, Outcome, Verbosity, usage};
+
+/// Arguments of `vice annotate`.
+#[derive(Debug, clap::Args)]
+#[command(
+    mut_arg("estimate", |a| a.required(false)),
+    after_help = "Examples:\n  \
+    vice annotate V1_01_easy --labels floor.json --fps 10 --duration 30\n  \
+    vice annotate my_run --labels my.json --estimate openvins.txt --depth zmap --no-open\n\n\
+    Labels are on the disk before the page says so; Ctrl-C ends the program. A CSV is not written over: its labels go\n\
+    on in a JSON beside it. What was done is kept in FILE.json.journal, with all steps for undo.\n\
+    In the page `?` shows the keys."
+)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    dataset: DatasetArgs,
+    /// Labels, made with the first point where they are not there yet.
+    #[arg(long, value_name = "FILE", help_heading = "Labels")]
+    labels: PathBuf,
+    /// Label the frame nearest to each tick of this rate [default: every frame].
+    #[arg(long, value_name = "HZ", value_parser = positive, help_heading = "Labels")]
+    fps: Option<f64>,
+    /// Seconds after the camera's first frame.
+    #[arg(long, value_name = "S", default_value = "0", allow_hyphen_values = true, value_parser = span_not_negative, help_heading = "Labels")]
+    start: Span,
+    /// Seconds from there [default: to the end].
+    #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = span_not_negative, help_heading = "Labels")]
+    duration: Option<Span>,
+    #[command(flatten)]
+    streams: StreamArgs,
+    /// Depth source of dots and suggestions: floor, zmap, zcam, mesh [default: floor].
+    #[arg(long, value_name = "SOURCE", help_heading = "Depth")]
+    depth: Option<String>,
+    #[command(flatten)]
+    depth_options: DepthArgs,
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+/// How the page is reached.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Page")]
+struct ServerArgs {
+    /// Port to listen on; 0 takes a free one.
+    #[arg(long, default_value = "0")]
+    port: u16,
+    /// Address to listen on, where others shall reach the page.
+    #[arg(long, value_name = "ADDR", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
+    bind: IpAddr,
+    /// Print the page's address only; do not open a browser.
+    #[arg(long)]
+    no_open: bool,
+    /// Keys for actions, as JSON: {"next-frame": ["e", "pagedown"]}; the page's help lists the actions.
+    #[arg(long, value_name = "FILE")]
+    keys: Option<PathBuf>,
+}
+
+pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
+    let keys = keys(args)?;
+    let calibration = args.depth_options.calibration()?;
+    let dataset = args.dataset.open()?;
+    let used = args.dataset.used_camera(dataset.as_ref(), calibration.as_ref())?;
+    let window =
+        Window { fps: args.fps, start: args.start, duration: args.duration, ..Window::default() };
+    let chosen = window.frames(&used.frames);
+    if chosen.is_empty() {
+        return Err(usage(format!(
+            "no frame lies in the part of the run that was asked for; camera {} has {} (see --start, --duration)",
+            used.name,
+            used.frames.len()
+        )));
+    }
+    let frames = Arc::clone(&used.frames);
+    let (camera_name, camera) = (used.name.clone(), used.camera.clone());
+    let target = Target { dataset: dataset.name(), camera: &camera_name, frames: &frames };
+    let store = Store::open(&args.labels, &target)?;
+    if let Some(reason) = store.read_only() {
+        tracing::warn!("{}: {reason}; the labels are shown, but cannot be changed", store.path().display());
+    }
+    let estimates = SceneEstimates::open(
+        &dataset,
+        used,
+        &chosen,
+        args.streams.clone(),
+        args.depth.as_deref(),
+        &args.depth_options,
+        calibration,
+    )?;
+    let desk = Desk {
+        dataset,
+        camera_name,
+        camera,
+        frames,
+        chosen,
+        store: Arc::new(Mutex::new(store)),
+        estimates: estimates.map(|e| Arc::new(e) as Arc<dyn Estimates>),
+    };
+    if !args.server.bind.is_loopback() {
+        tracing::warn!(
+            "--bind {}: whoever reaches this address and learns the token can see the images and change the labels, and \
+             nothing is encrypted",
+            args.server.bind
+        );
+    }
+    let options = ServerOptions { bind: args.server.bind, port: args.server.port, keys };
+    serve(desk, &options, |url| {
+        // A closed standard output is no reason to end.
+        let _ = terminal::print(&format!("{url}\n"));
+        verbosity.note("Open this address in a browser on this machine; Ctrl-C ends.");
+        if !args.server.no_open
+            && let Err(error) = open::that_detached(url)
+        {
+            tracing::warn!("no browser could be opened ({error}): open the address above by hand");
+        }
+    })?;
+    Ok(Outcome::Done)
+}
+
+fn keys(args: &Args) -> anyhow::Result<BTreeMap<String, Vec<String>>> {
+    let Some(path) = &args.server.keys else { return Ok(BTreeMap::new()) };
+    let shown = || path.display().to_string();
+    let text = std::fs::read_to_string(path).with_context(shown)?;
+    serde_json::from_str(&text).with_context(|| {
+        format!("{}: expected keys by action, such as {{\"next-frame\": [\"e\"]}}", shown())
+    })
+}
