@@ -27,6 +27,7 @@ export class Session {
     this.listener = listener;
     /** @type {Promise<unknown>} */
     this.last = Promise.resolve();
+    /** Writes that are not acknowledged yet. */
     this.pending = 0;
     this.projectionsTimer = 0;
   }
@@ -58,7 +59,7 @@ export class Session {
       const known = this.#apply(change);
       if (known === "missed") await this.reload();
       if (known !== "known" && change.by !== "track") this.listener.elsewhere(change);
-    });
+    }).catch(() => undefined);
   }
 
   /** @param {Change} change */
@@ -77,12 +78,23 @@ export class Session {
    * @returns {Promise<T>}
    */
   #queue(work) {
-    this.pending += 1;
-    const run = this.last.then(work, work).finally(() => {
-      this.pending -= 1;
-    });
+    const run = this.last.then(work);
     this.last = run.catch(() => undefined);
     return run;
+  }
+
+  /**
+   * @template T
+   * @param {() => Promise<T>} work
+   * @returns {Promise<T>}
+   */
+  #write(work) {
+    this.pending += 1;
+    this.listener.changed();
+    return this.#queue(work).finally(() => {
+      this.pending -= 1;
+      this.listener.changed();
+    });
   }
 
   async reload() {
@@ -114,7 +126,7 @@ export class Session {
    */
   edit(edits) {
     const seen = this.labels.touchedBy(edits);
-    return this.#queue(async () => {
+    return this.#write(async () => {
       try {
         await this.#edit(edits, seen);
         return true;
@@ -153,7 +165,7 @@ export class Session {
    * @returns {Promise<Change | null>}
    */
   history(which) {
-    return this.#queue(async () => {
+    return this.#write(async () => {
       try {
         const change = await postHistory(which, this.labels.state.revision);
         await this.#answered(change);
@@ -173,7 +185,7 @@ export class Session {
    * @returns {Promise<boolean>} whether it has begun
    */
   track(points, frame, direction, until) {
-    return this.#queue(async () => {
+    return this.#write(async () => {
       try {
         const job = await postTrack(this.labels.state.revision, { points, frame, direction, until });
         if (job.state === "running") this.labels.applyJob(job);
@@ -203,7 +215,7 @@ export class Session {
    * @returns {Promise<boolean>}
    */
   bringIn(format, body) {
-    return this.#queue(async () => {
+    return this.#write(async () => {
       try {
         await this.#answered(await postImport(format, body));
         return true;
