@@ -53,12 +53,13 @@ export function scratch() {
 
 /**
  * A rendered flight with exact labels.
- * @param {number} seconds at 10 Hz
+ * @param {number} seconds
+ * @param {number} [rateHz]
  * @returns {string} its folder
  */
-export function flight(seconds) {
+export function flight(seconds, rateHz = 10) {
   const folder = join(scratch(), "flight");
-  run(program(), ["synth", folder, "--duration", String(seconds), "--rate", "10"]);
+  run(program(), ["synth", folder, "--duration", String(seconds), "--rate", String(rateHz)]);
   return folder;
 }
 
