@@ -5,7 +5,7 @@ import assert from "node:assert/strict";
 import { spawn, spawnSync } from "node:child_process";
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
-import { dirname, join, resolve } from "node:path";
+import { basename, dirname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 
 import { chromium } from "playwright-core";
@@ -15,14 +15,14 @@ import { chromium } from "playwright-core";
 /** @import {State} from "../../vice-annotate/page/types.js" */
 
 export const ROOT = resolve(dirname(fileURLToPath(import.meta.url)), "../..");
-const TARGET = process.env.CARGO_TARGET_DIR ?? join(ROOT, "target");
+const TARGET = resolve(ROOT, process.env.CARGO_TARGET_DIR ?? "target");
 export const SCREENSHOTS = join(TARGET, "browser-screenshots");
 const START_MS = 60_000;
 export const WAIT_MS = 30_000;
 
 /** @returns {string} */
 function program() {
-  const found = process.env.VICE_BIN ?? join(TARGET, "debug", "vice");
+  const found = resolve(process.env.VICE_BIN ?? join(TARGET, "debug", "vice"));
   assert.ok(existsSync(found), `${found} is missing: run \`cargo build\`, or say in VICE_BIN where \`vice\` is`);
   return found;
 }
@@ -123,12 +123,15 @@ export class Server {
 
   /**
    * @param {string} dataset
-   * @param {string} labels
+   * @param {string} labels the file, in a folder that is there
    * @param {string[]} [more] arguments
    * @returns {Promise<Server>}
    */
   static async start(dataset, labels, more = []) {
-    const child = spawn(program(), ["annotate", dataset, "--labels", labels, "--no-open", "--port", "0", ...more], { stdio: ["ignore", "pipe", "pipe"] });
+    const child = spawn(program(), ["annotate", dataset, "--labels", basename(labels), "--no-open", "--port", "0", ...more], {
+      cwd: dirname(labels),
+      stdio: ["ignore", "pipe", "pipe"],
+    });
     let said = "";
     /** @type {string} */
     const url = await new Promise((resolve, reject) => {
