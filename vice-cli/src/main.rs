@@ -32,7 +32,7 @@ fn main() -> ExitCode {
         Command::Depth(args) => commands::depth::run(args, verbosity),
         Command::Floor(command) => commands::floor::run(command, verbosity),
         Command::Synth(args) => commands::synth::run(args, verbosity),
-        Command::Labels(args) => commands::labels::run(args),
+        Command::Labels(args) => commands::labels::run(args, verbosity),
         Command::Convert(args) => commands::convert::run(args),
         Command::Completions(args) => commands::completions::run(args),
     };

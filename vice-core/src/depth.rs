@@ -81,11 +81,14 @@ pub enum DepthMiss {
     /// The ray meets no surface of the mesh.
     #[error("the ray meets no surface of the mesh")]
     NoSurface,
+    /// The pixel lies on no calibration target whose pose is known.
+    #[error("the pixel lies on no calibration target whose pose is known")]
+    NoTarget,
 }
 
 /// Something that knows the depth of pixels at key frames.
 pub trait DepthSource: Send + Sync {
-    /// Name in tables and documents: `floor`, `zmap`, `zcam`, `mesh`.
+    /// Name in tables and documents: `floor`, `zmap`, `zcam`, `mesh`, `tag`.
     fn name(&self) -> &str;
 
     /// Depths of pixels of one key frame, in their order. Asked once for all pixels of a key frame, since what can be

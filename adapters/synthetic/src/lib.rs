@@ -2,7 +2,7 @@
 //!
 //! A seed decides a [`Scene`] (floor, walls, boxes) and a [`Flight`] (an analytic curve around the boxes). From both
 //! [`Synthetic`] makes a [`vice_core::dataset::Dataset`] in memory: images, depth, inertial samples, a scan, ground
-//! truth, labels, and estimates that are wrong in one known way each.
+//! truth, labels, and estimates that are wrong in one known way each. [`render_targets`] draws calibration targets with known corners.
 #![forbid(unsafe_code)]
 
 mod cloud;
@@ -16,6 +16,7 @@ mod render;
 mod rng;
 mod scene;
 mod sensors;
+mod target;
 mod texture;
 mod write;
 
@@ -24,4 +25,5 @@ pub use estimates::ESTIMATES;
 pub use flight::{Flight, State};
 pub use options::{Flaws, SyntheticOptions};
 pub use scene::{Hit, ROOM_HEIGHT_M, ROOM_SIDE_M, Scene, Surface, SurfaceKind};
+pub use target::{Shot, Target, render_targets};
 pub use write::{METRES_PER_COUNT, write_euroc};

@@ -73,7 +73,7 @@ struct ImageArgs {
     /// Frame: its index, or its stamp in nanoseconds.
     #[arg(long, value_name = "STAMP|INDEX")]
     at: String,
-    /// Depth sources: floor, zmap, zcam, mesh.
+    /// Depth sources: floor, zmap, zcam, mesh, tag.
     #[arg(long, value_name = "SOURCE,...", required = true)]
     source: Vec<String>,
     /// Folder for the images; files of the same names are replaced.

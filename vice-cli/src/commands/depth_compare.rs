@@ -23,7 +23,7 @@ pub(crate) struct Args {
     dataset: DatasetArgs,
     #[command(flatten)]
     labels: LabelArgs,
-    /// Two or more depth sources: floor, zmap, zcam, mesh.
+    /// Two or more depth sources: floor, zmap, zcam, mesh, tag.
     #[arg(long, value_name = "SOURCE,...", required = true)]
     source: Vec<String>,
     #[command(flatten)]

@@ -30,7 +30,7 @@ pub(crate) struct Args {
     labels: LabelArgs,
     #[command(flatten)]
     streams: StreamArgs,
-    /// Depth sources: floor, zmap, zcam, mesh [default: floor].
+    /// Depth sources: floor, zmap, zcam, mesh, tag [default: floor].
     #[arg(long, value_name = "SOURCE,...", help_heading = "Depth")]
     depth: Vec<String>,
     #[command(flatten)]
@@ -229,6 +229,10 @@ fn other_settings(args: &Args) -> std::collections::BTreeMap<String, String> {
     }
     if let Some([near, far]) = args.depth_options.zcam_range {
         other.insert("zcam-range".to_string(), format!("{near},{far}"));
+    }
+    if let Some(size_m) = args.depth_options.tag_size {
+        other.insert("tag-size".to_string(), size_m.to_string());
+        other.insert("tag-family".to_string(), args.depth_options.tag_family.name().to_string());
     }
     other
 }

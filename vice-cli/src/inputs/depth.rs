@@ -12,6 +12,7 @@ use vice_depth::{
     Cloud, CloudOptions, FloorDepth, Mesh, MeshDepth, ZCamDepth, ZCamOptions, ZMapDepth, ZMapOptions,
     load_cloud,
 };
+use vice_detect::{TagDepth, TagFamily, TagOptions};
 use vice_files::calibration::CalibrationFile;
 use vice_files::trajectory::{ReadOptions, read_spec};
 
@@ -35,6 +36,12 @@ pub(crate) struct DepthArgs {
     /// Depth camera readings outside of these are not trusted, metres.
     #[arg(long, value_name = "NEAR,FAR", value_parser = numbers::<2>)]
     pub(crate) zcam_range: Option<[f64; 2]>,
+    /// Side of the tags for the depth source tag: the dark border's outside, metres.
+    #[arg(long, value_name = "M", value_parser = positive)]
+    pub(crate) tag_size: Option<f64>,
+    /// Family of the tags for the depth source tag: 36h11, 25h9 or 16h5.
+    #[arg(long, value_name = "FAMILY", default_value = "36h11")]
+    pub(crate) tag_family: TagFamily,
     /// Calibration that overrides the data set's: TOML, or a Kalibr camchain.
     #[arg(long, value_name = "FILE")]
     pub(crate) calibration: Option<PathBuf>,
@@ -117,7 +124,16 @@ impl DepthArgs {
                 };
                 Ok(Box::new(MeshDepth::new(Arc::new(Mesh::read_ply(path)?), reference.world_from_cloud)))
             }
-            _ => Err(usage(format!("{option}: unknown depth source {name}; known: floor, zmap, zcam, mesh"))),
+            "tag" => {
+                let size_m = self.tag_size.ok_or_else(|| {
+                    usage(format!("{option} tag: how large the tags are is not known (give --tag-size M)"))
+                })?;
+                let options = TagOptions { family: self.tag_family, border: None };
+                Ok(Box::new(TagDepth::new(Arc::clone(dataset), camera, options, size_m)?))
+            }
+            _ => Err(usage(format!(
+                "{option}: unknown depth source {name}; known: floor, zmap, zcam, mesh, tag"
+            ))),
         }
     }
 

@@ -102,6 +102,7 @@ impl SkipReason {
                 DepthMiss::NoDepth => "keyframe-no-depth",
                 DepthMiss::OutOfRange => "keyframe-depth-out-of-range",
                 DepthMiss::NoSurface => "keyframe-no-surface",
+                DepthMiss::NoTarget => "keyframe-no-target",
             },
         }
     }

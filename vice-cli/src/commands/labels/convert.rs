@@ -1,4 +1,4 @@
-//! `vice labels`.
+//! `vice labels convert`.
 
 use std::path::PathBuf;
 
@@ -8,19 +8,12 @@ use vice_files::labels::{self, LabelFormat};
 use crate::inputs::DatasetArgs;
 use crate::terminal::{self, Outcome};
 
-/// What to do with labels.
-#[derive(Debug, clap::Subcommand)]
-pub(crate) enum Command {
-    /// Convert labels between CSV and JSON, or from the authors' pickle.
-    Convert(ConvertArgs),
-}
-
 /// Arguments of `vice labels convert`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  vice labels convert floor.csv floor.json\n  \
     vice labels convert labels.pickle labels.csv --dataset V1_01_easy\n\n\
     The pickle counts frames; the data set says which stamps they have.")]
-pub(crate) struct ConvertArgs {
+pub(crate) struct Args {
     /// Labels to read: CSV, JSON (vice.labels/1) or the authors' pickle.
     #[arg(value_name = "IN")]
     input: PathBuf,
@@ -38,13 +31,7 @@ pub(crate) struct ConvertArgs {
     force: bool,
 }
 
-pub(crate) fn run(command: &Command) -> anyhow::Result<Outcome> {
-    match command {
-        Command::Convert(args) => convert(args),
-    }
-}
-
-fn convert(args: &ConvertArgs) -> anyhow::Result<Outcome> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let frames = match &args.dataset {
         Some(path) => {
             let open = DatasetArgs {

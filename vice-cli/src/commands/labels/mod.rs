@@ -1,0 +1,22 @@
+//! `vice labels`.
+
+mod convert;
+mod detect;
+
+use crate::terminal::{Outcome, Verbosity};
+
+/// What to do with labels.
+#[derive(Debug, clap::Subcommand)]
+pub(crate) enum Command {
+    /// Convert labels between CSV and JSON, or from the authors' pickle.
+    Convert(convert::Args),
+    /// Label the corners of AprilTags and chessboards by themselves.
+    Detect(detect::Args),
+}
+
+pub(crate) fn run(command: &Command, verbosity: Verbosity) -> anyhow::Result<Outcome> {
+    match command {
+        Command::Convert(args) => convert::run(args),
+        Command::Detect(args) => detect::run(args, verbosity),
+    }
+}
