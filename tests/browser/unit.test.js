@@ -65,11 +65,19 @@ test("a change is applied once and in order", () => {
 });
 
 test("doubtful frames are found in both directions, whichever lane they are in", () => {
-  const labels = new Labels(state([seen(2, { confidence: 0.3 }), seen(4), seen(8, { uncertain: true, confidence: null })]));
-  assert.deepEqual(labels.doubtfulFrom(1, 1), { place: 4, name: "1" });
-  assert.deepEqual(labels.doubtfulFrom(4, -1), { place: 1, name: "1" });
-  assert.equal(labels.doubtfulFrom(4, 1), null);
+  const labels = new Labels(state([seen(2, { confidence: 0.3 }), seen(4), seen(18, { uncertain: true, confidence: null })]));
+  assert.deepEqual(labels.doubtfulFrom(1, 1), { place: 9, name: "1" });
+  assert.deepEqual(labels.doubtfulFrom(9, -1), { place: 1, name: "1" });
+  assert.equal(labels.doubtfulFrom(9, 1), null);
   assert.equal(labels.doubtfulCount, 2);
+});
+
+test("where tracking broke off inside the image is doubtful, a gap in a segment and the border are not", () => {
+  assert.deepEqual(new Labels(state([seen(2), seen(4)])).doubtfulFrom(0, 1), { place: 3, name: "1" });
+  assert.equal(new Labels(state([seen(2), seen(4)])).doubtfulCount, 1);
+  assert.equal(new Labels(state([seen(2), seen(8), seen(18)])).doubtfulFrom(0, 1), null);
+  assert.deepEqual(new Labels(state([seen(2), seen(8, { keyframe: true })])).doubtfulFrom(0, 1)?.place, 2);
+  assert.equal(new Labels(state([seen(2), seen(4, { u: 637 })])).doubtfulCount, 0);
 });
 
 test("a respawn is offered after a lane that ended at the border, and not after one that ended inside", () => {

@@ -196,18 +196,36 @@ export class Labels {
    * @returns {string[]}
    */
   goneAt(frame) {
-    const { width, height } = this.state;
-    const margin = Math.max(8, width * BORDER);
     return this.names.filter((name) => {
       const last = this.lastUpTo(name, frame);
       if (!last || last.frame === frame || last !== this.#observations(name).at(-1)) return false;
-      const { u, v } = last;
-      return u < margin || v < margin || u > width - 1 - margin || v > height - 1 - margin;
+      return this.#atBorder(last);
     });
   }
 
+  /** @param {Pixel} pixel */
+  #atBorder({ u, v }) {
+    const { width, height } = this.state;
+    const margin = Math.max(8, width * BORDER);
+    return u < margin || v < margin || u > width - 1 - margin || v > height - 1 - margin;
+  }
+
   /**
-   * The nearest frame before or after, not itself, with a doubtful observation.
+   * @param {string} name
+   * @param {number} place among the frames
+   * @returns {boolean} whether tracking broke off before this frame, inside the image
+   */
+  lostAt(name, place) {
+    const { frames } = this.state;
+    const before = place > 0 ? this.at(name, frames[place - 1].frame) : null;
+    if (!before || this.at(name, frames[place].frame) || this.#atBorder(before)) return false;
+    // A gap in a segment is a frame that could not be decoded, or was deleted.
+    const next = this.#observations(name).find((each) => each.frame > frames[place].frame);
+    return next === undefined || next.keyframe;
+  }
+
+  /**
+   * The nearest frame before or after, not itself, with a doubtful observation, or where tracking broke off.
    * @param {number} place among the frames
    * @param {1 | -1} step
    * @returns {{place: number, name: string} | null}
@@ -217,18 +235,22 @@ export class Labels {
     for (let at = place + step; at >= 0 && at < frames.length; at += step) {
       for (const { name } of points) {
         const observation = this.at(name, frames[at].frame);
-        if (observation && this.doubtful(observation)) return { place: at, name };
+        if (observation ? this.doubtful(observation) : this.lostAt(name, at)) return { place: at, name };
       }
     }
     return null;
   }
 
-  /** @returns {number} frames with a doubtful observation */
+  /** @returns {number} frames with a doubtful observation, or where tracking broke off */
   get doubtfulCount() {
     if (this.countedAt === this.state.revision) return this.counted;
     const frames = new Set();
-    for (const { observations } of this.state.points) {
-      for (const each of observations) if (this.doubtful(each)) frames.add(each.frame);
+    for (const { name, observations } of this.state.points) {
+      for (const each of observations) {
+        if (this.doubtful(each)) frames.add(each.frame);
+        const after = (this.places.get(each.frame) ?? Infinity) + 1;
+        if (after < this.state.frames.length && this.lostAt(name, after)) frames.add(this.state.frames[after].frame);
+      }
     }
     this.countedAt = this.state.revision;
     this.counted = frames.size;

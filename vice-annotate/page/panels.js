@@ -66,7 +66,7 @@ export class Panels {
       const observation = app.labels.at(name, app.frame);
       const doubtful = observation !== null && app.labels.doubtful(observation);
       choose.setAttribute("aria-current", String(name === app.selected));
-      here.classList.toggle("doubt", doubtful);
+      here.classList.toggle("doubt", doubtful || app.labels.lostAt(name, app.place));
       setText(here, this.#hereText(name, observation, doubtful));
     }
   }
@@ -78,7 +78,7 @@ export class Panels {
    */
   #hereText(name, observation, doubtful) {
     if (!this.app.labels.lanes.has(name)) return "to be placed";
-    if (!observation) return "not here";
+    if (!observation) return this.app.labels.lostAt(name, this.app.place) ? "lost" : "not here";
     if (doubtful) return "doubtful";
     return observation.occluded ? "occluded" : SOURCES[observation.source];
   }

@@ -204,6 +204,7 @@ export class Timeline {
     context.font = "11px system-ui, sans-serif";
     context.textBaseline = "middle";
     let next = 0;
+    let written = 0;
     frames.forEach(({ time_s }, place) => {
       if (time_s + 1e-6 < next) return;
       const x = this.#x(place + 0.5);
@@ -213,7 +214,12 @@ export class Timeline {
       context.fillRect(Math.round(x), RULER - 4, 1, height);
       context.fillStyle = "#9aa7b2";
       const text = `${Number(time_s.toFixed(step < 1 ? 1 : 0))} s`;
-      context.fillText(text, Math.min(x + 4, this.width - context.measureText(text).width - 4), 9);
+      const wide = context.measureText(text).width;
+      const left = Math.min(x + 4, this.width - wide - 4);
+      // Where frames are missing their times come close to each other.
+      if (left < written) return;
+      context.fillText(text, left, 9);
+      written = left + wide + 8;
     });
   }
 
