@@ -317,7 +317,9 @@ test("a second program on the same file may only look", async () => {
   const { x, y } = await window.place({ u: 250, v: 100 }, before);
   await window.page.mouse.click(x, y);
   await window.press("d");
-  assert.ok(await window.page.getByRole("button", { name: "Undo" }).isDisabled());
+  for (const name of ["Undo", "New", "Respawn", "Delete here", "Track ▶"]) {
+    assert.ok(await window.page.getByRole("button", { name, exact: true }).isDisabled(), name);
+  }
   await window.screenshot("8-read-only");
   const refused = await other.request("/api/edits", {
     method: "POST",

@@ -9,6 +9,9 @@ import { nameOf } from "./keys.js";
 
 const ZOOM_STEP = 1.4;
 const FAR = 10;
+const WRITES = new Set([
+  "new-point", "suggest", "respawn", "track-forward", "track-backward", "track-both", "track-all", "delete", "delete-after",
+]);
 
 /**
  * @param {App} app
@@ -121,6 +124,13 @@ export function listenToButtons(app, table) {
     if (event.detail === 0 || !(event.target instanceof Element)) return;
     if (event.target.closest("button, summary, input[type=checkbox], input[type=range]") && !event.target.closest("dialog, #file-menu")) app.viewer.marks.focus();
   });
+}
+
+/** Buttons that would write are dead where nothing may be written. @param {App} app */
+export function disableWrites(app) {
+  for (const each of document.querySelectorAll("button[data-action]")) {
+    if (each instanceof HTMLButtonElement && WRITES.has(each.dataset.action ?? "")) each.disabled = !app.writable;
+  }
 }
 
 /** @param {App} app */

@@ -5,7 +5,7 @@
 import { Actions } from "./actions.js";
 import { exportAddress, getState, ServerError } from "./api.js";
 import { App } from "./app.js";
-import { commands, listenToButtons, listenToKeys, showKeyHints } from "./commands.js";
+import { commands, disableWrites, listenToButtons, listenToKeys, showKeyHints } from "./commands.js";
 import { byId, setText } from "./dom.js";
 import { bringIn } from "./exchange.js";
 import { Help } from "./help.js";
@@ -91,6 +91,7 @@ async function open() {
   listenToKeys(app, table);
   listenToButtons(app, table);
   showKeyHints(app);
+  disableWrites(app);
   if (labels.state.floor_suggestions) setText(byId("suggest", HTMLElement), "Suggest on the floor");
   joinSwitches(app);
   speak(app);

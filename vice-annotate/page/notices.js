@@ -21,7 +21,9 @@ export class Notices {
    */
   tell(kind, text) {
     // Of plain notes only the newest is worth its room; what went wrong stays a while.
-    for (const old of this.notes.querySelectorAll(".note.info")) old.remove();
+    for (const old of this.notes.querySelectorAll(".note")) {
+      if (old.classList.contains("info") || old.querySelector("span")?.textContent === text) old.remove();
+    }
     const note = make("div", { class: `note ${kind}` }, [make("span", { text })]);
     note.append(button("×", () => note.remove(), { class: "plain", label: "Close this note" }));
     this.notes.append(note);

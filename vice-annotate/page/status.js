@@ -52,7 +52,7 @@ export class Status {
     if (app.writable) this.notices.clear("read-only");
     else {
       const reason = state.read_only_reason ?? "another window writes to this file";
-      this.notices.banner("read-only", "warning", `Read only: ${reason}. What is written elsewhere appears here by itself.`);
+      this.notices.banner("read-only", "warning", `Read only: ${reason}. The labels are shown as they were when this program started.`);
     }
   }
 
