@@ -40,8 +40,11 @@ pub(crate) enum Command {
     Annotate(Box<commands::annotate::Args>),
     /// Show what a data set holds.
     Info(commands::info::Args),
-    /// List the data set formats.
-    Formats,
+    /// List the data set formats, built in and of plugins.
+    Formats(commands::formats::Args),
+    /// Check a plugin, or start a new one.
+    #[command(subcommand)]
+    Plugin(commands::plugin::Command),
     /// Depth images of a frame from each source; `compare` for labelled key points.
     Depth(Box<commands::depth::Args>),
     /// The floor plane.

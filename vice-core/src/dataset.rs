@@ -75,6 +75,11 @@ pub trait Dataset: Send + Sync {
     /// [`DataError`] if there is no such stream or its rows cannot be used.
     fn trajectory(&self, stream: &str) -> DataResult<Trajectory>;
 
+    /// Whether a pose stream was chained from relative motions: it starts anywhere, and knows no floor.
+    fn is_relative(&self, _stream: &str) -> bool {
+        false
+    }
+
     /// Inertial samples in the body frame, strictly ordered; empty where the robot has none.
     ///
     /// # Errors
@@ -366,6 +371,11 @@ impl<F> Plane<F> {
             d_m: d_m / length,
             frame: std::marker::PhantomData,
         })
+    }
+
+    /// The plane of a normal that is of unit length already, kept to the bit; `d_m` is finite.
+    pub const fn from_unit(normal: Unit<Vector3<f64>>, d_m: f64) -> Self {
+        Self { normal, d_m, frame: std::marker::PhantomData }
     }
 
     /// z = 0.

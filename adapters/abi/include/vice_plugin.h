@@ -347,8 +347,8 @@ typedef struct vice_plugin_table {
 #endif
 
 /*
- * The one symbol of a plugin. Null where it cannot work with this host, having logged why. `host` outlives the library.
- * Called once, before everything else.
+ * The one symbol of a plugin. Null where it cannot work with this host, having logged why. `host` lives as long as the process.
+ * Called before everything else; if it is called again it hands over the same table.
  */
 VICE_EXPORT const vice_plugin_table *vice_plugin(const vice_host *host);
 

@@ -131,6 +131,10 @@ class Format {
 inline void log(std::int32_t level, std::string_view line);
 inline void warn(std::string_view line) { log(VICE_LOG_WARN, line); }
 
+// Hidden, or the loader would take the static variables of two plugins for one.
+#if defined(__GNUC__)
+#pragma GCC visibility push(hidden)
+#endif
 namespace detail {
 
 inline const vice_host *&host() {
@@ -482,6 +486,9 @@ struct Export {
 };
 
 }  // namespace detail
+#if defined(__GNUC__)
+#pragma GCC visibility pop
+#endif
 
 inline void log(std::int32_t level, std::string_view line) {
     const vice_host *h = detail::host();

@@ -30,3 +30,8 @@ pub mod export;
 mod text;
 
 pub use text::path_from_bytes;
+
+/// The contract in C, `include/vice_plugin.h`.
+pub const HEADER: &str = include_str!("../include/vice_plugin.h");
+/// Its wrapper for C++17, `include/vice_plugin.hpp`.
+pub const CPP_HEADER: &str = include_str!("../include/vice_plugin.hpp");

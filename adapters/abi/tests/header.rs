@@ -1,6 +1,9 @@
 //! `include/vice_plugin.h` and the Rust types are the same contract: the header is compiled, and every size, place and
 //! constant in it is compared.
 
+// Helpers of tests fail their test.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

@@ -22,7 +22,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let path = &args.dataset.path;
     if args.dataset.format.is_none() {
-        let registry = formats::registry();
+        let registry = formats::registry(&args.dataset.plugins)?;
         if let (factory, Probe::Collection(runs)) = registry.detect(path)? {
             return list(&factory.info().name, path, &runs);
         }

@@ -9,7 +9,7 @@ use vice_core::frames::BodyFromCamera;
 use vice_core::time::Stamp;
 use vice_files::calibration::CalibrationFile;
 
-use crate::formats;
+use crate::formats::{self, PluginArgs};
 use crate::terminal::usage;
 
 /// Which data set, and which camera of it.
@@ -28,6 +28,8 @@ pub(crate) struct DatasetArgs {
     /// Camera [default: the first].
     #[arg(long, value_name = "NAME")]
     pub(crate) camera: Option<String>,
+    #[command(flatten)]
+    pub(crate) plugins: PluginArgs,
 }
 
 /// A camera as it is used: the data set's, with what a calibration file overrides.
@@ -42,7 +44,7 @@ pub(crate) struct UsedCamera {
 impl DatasetArgs {
     pub(crate) fn open(&self) -> anyhow::Result<Arc<dyn Dataset>> {
         let options = OpenOptions { settings: self.settings.iter().cloned().collect() };
-        Ok(Arc::from(formats::registry().open(&self.path, self.format.as_deref(), &options)?))
+        Ok(Arc::from(formats::registry(&self.plugins)?.open(&self.path, self.format.as_deref(), &options)?))
     }
 
     /// The name of the camera that was asked for, or the first.
@@ -96,7 +98,7 @@ fn check_calibrated(file: &CalibrationFile, camera: &str) -> anyhow::Result<()> 
     )))
 }
 
-fn setting(text: &str) -> Result<(String, String), String> {
+pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((key, value)) if !key.is_empty() => Ok((key.trim().to_string(), value.trim().to_string())),
         _ => Err("expected KEY=VALUE".to_string()),

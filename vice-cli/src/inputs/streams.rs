@@ -219,7 +219,7 @@ impl Loader<'_> {
         if !self.world_depth {
             return Ok(());
         }
-        if spec.starts_with("rel:") {
+        if spec.starts_with("rel:") || self.dataset.is_relative(&spec) {
             return Err(usage(format!(
                 "{spec} places the camera for depth, but relative motions have no place in the world: give --initial-pose \
                  (or --depth zcam)"

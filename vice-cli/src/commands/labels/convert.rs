@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use vice_files::atomic::Overwrite;
 use vice_files::labels::{self, LabelFormat};
 
+use crate::formats::PluginArgs;
 use crate::inputs::DatasetArgs;
 use crate::terminal::{self, Outcome};
 
@@ -26,6 +27,8 @@ pub(crate) struct Args {
     /// Camera of that data set [default: the first].
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
+    #[command(flatten)]
+    plugins: PluginArgs,
     /// Replace a file that exists.
     #[arg(long)]
     force: bool,
@@ -39,6 +42,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
                 format: None,
                 settings: vec![],
                 camera: args.camera.clone(),
+                plugins: args.plugins.clone(),
             };
             let dataset = open.open()?;
             let camera = open.camera_name(dataset.as_ref())?;

@@ -1,0 +1,28 @@
+//! Plugins: shared libraries that read a format of robot data, behind the core's traits.
+//!
+//! ```text
+//! search       where plugins lie that nobody named
+//! place        whose file it is, and who may write to it
+//! binary       whether it is a library for this machine
+//! library      loading, and the table: versions, sizes, null pointers
+//! border       texts and lists read from the other side
+//! values       the contract's values as the core's, checked
+//! dataset      a data set of a plugin
+//! conformance  what an adapter is expected to do, as a suite that anyone can run
+//! ```
+//!
+//! A plugin is native code and can do whatever the program can. What is checked is what an honest plugin gets wrong: all that it
+//! hands over is validated before the core sees it, and calls of a plugin that is not thread-safe never overlap.
+//! Libraries are never unloaded: their thread-locals and static variables have destructors that would run later.
+
+mod binary;
+mod border;
+pub mod conformance;
+mod dataset;
+mod host_log;
+mod library;
+mod place;
+pub mod search;
+mod values;
+
+pub use library::{LoadOptions, Plugin};

@@ -1,0 +1,3 @@
+//! The format `euroc` as a plugin: the same code as the built-in one, exported.
+
+vice_abi::export_plugin!(vice_euroc::Euroc);

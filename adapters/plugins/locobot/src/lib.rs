@@ -1,0 +1,3 @@
+//! The format `locobot` as a plugin: the same code as the built-in one, exported.
+
+vice_abi::export_plugin!(vice_locobot::Locobot);

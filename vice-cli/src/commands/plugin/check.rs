@@ -1,0 +1,202 @@
+//! `vice plugin check`: the conformance suite on a plugin, in a process of its own that may crash or hang.
+
+use std::io::{BufRead, BufReader};
+use std::path::PathBuf;
+use std::process::{Child, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::Duration;
+
+use anyhow::Context;
+use vice_host::conformance::{Event, Verdict};
+
+use super::child;
+use crate::terminal::{self, Outcome, printable, usage};
+
+/// Arguments of `vice plugin check`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example: vice plugin check libvice_adapter_myrobot.so my_recording\n\n\
+    `good` is as it should be, `missing` is allowed and says what will not work without it, `suspicious` is allowed but\n\
+    looks like a mistake, FAULT breaks the contract. The exit code is 1 where there is a fault.")]
+pub(crate) struct Args {
+    /// The plugin, a shared library.
+    #[arg(value_name = "FILE")]
+    pub(super) file: PathBuf,
+    /// A data set of its format.
+    #[arg(value_name = "DATASET")]
+    pub(super) dataset: PathBuf,
+    /// Setting of the format.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = crate::inputs::setting)]
+    pub(super) settings: Vec<(String, String)>,
+    /// Times the data set is opened and closed.
+    #[arg(long, value_name = "N", default_value = "1000")]
+    pub(super) cycles: u32,
+    /// Images that are read of each camera.
+    #[arg(long, value_name = "N", default_value = "200")]
+    pub(super) images: usize,
+    /// Seconds after which a call counts as hanging.
+    #[arg(long, value_name = "S", default_value = "120", value_parser = clap::value_parser!(u64).range(1..))]
+    timeout: u64,
+    /// Load the plugin even from a file or folder that others may write to.
+    #[arg(long)]
+    pub(super) allow_writable_plugin: bool,
+    /// Run the suite itself: what the program starts as its child.
+    #[arg(long, hide = true)]
+    as_child: bool,
+}
+
+pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
+    if args.as_child {
+        return child::run(args);
+    }
+    if !args.dataset.exists() {
+        return Err(usage(format!("{}: no such file or folder", args.dataset.display())));
+    }
+    let program = std::env::current_exe().context("this program does not know where it is")?;
+    let mut child = std::process::Command::new(program)
+        .args(std::env::args_os().skip(1))
+        .arg("--as-child")
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .spawn()
+        .context("the check cannot be started in a process of its own")?;
+    let lines = lines_of(&mut child);
+    let mut report = Report::default();
+    let ended = report.follow(&lines, Duration::from_secs(args.timeout))?;
+    if ended == Ended::Hangs {
+        // It may have ended just now.
+        let _ = child.kill();
+    }
+    let status = child.wait().context("the end of the check cannot be awaited")?;
+    match ended {
+        Ended::Hangs => {
+            let step = report.step.clone();
+            report.find(
+                Verdict::Fault,
+                &format!("it hangs: no answer for {} s during: {step}", args.timeout),
+            )?;
+        }
+        Ended::Early if status.code() == Some(child::LOAD_FAILED) => {
+            return Err(anyhow::anyhow!("{}: cannot be checked, see above", args.file.display()));
+        }
+        Ended::Early => {
+            let step = report.step.clone();
+            report.find(Verdict::Fault, &format!("{} during: {step}", death(status)))?;
+        }
+        Ended::Complete => {}
+    }
+    report.sum_up()?;
+    match report.count(Verdict::Fault) {
+        0 => Ok(Outcome::Done),
+        1 => Err(anyhow::anyhow!("{}: 1 fault", args.file.display())),
+        n => Err(anyhow::anyhow!("{}: {n} faults", args.file.display())),
+    }
+}
+
+/// The child's standard output, line by line, read by a thread so that silence can be noticed.
+fn lines_of(child: &mut Child) -> Receiver<String> {
+    let (send, receive) = channel();
+    if let Some(out) = child.stdout.take() {
+        std::thread::spawn(move || {
+            let mut out = BufReader::new(out);
+            let mut line = Vec::new();
+            while out.read_until(b'\n', &mut line).is_ok_and(|n| n > 0) {
+                let text = String::from_utf8_lossy(&line).trim_end().to_string();
+                line.clear();
+                if send.send(text).is_err() {
+                    break;
+                }
+            }
+        });
+    }
+    receive
+}
+
+/// How the child's report ended.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Ended {
+    Complete,
+    Early,
+    Hangs,
+}
+
+#[derive(Default)]
+struct Report {
+    step: String,
+    found: Vec<Verdict>,
+    prints: bool,
+}
+
+impl Report {
+    fn follow(&mut self, lines: &Receiver<String>, timeout: Duration) -> anyhow::Result<Ended> {
+        self.step = "loading the library".to_string();
+        loop {
+            match lines.recv_timeout(timeout) {
+                Ok(line) => match child::parse(&line) {
+                    Some(child::Line::Event(Event::Step(step))) => self.step = step,
+                    Some(child::Line::Event(Event::Finding(verdict, text))) => self.find(verdict, &text)?,
+                    Some(child::Line::End) => return Ok(Ended::Complete),
+                    None => self.printed(&line)?,
+                },
+                Err(RecvTimeoutError::Timeout) => return Ok(Ended::Hangs),
+                Err(RecvTimeoutError::Disconnected) => return Ok(Ended::Early),
+            }
+        }
+    }
+
+    fn find(&mut self, verdict: Verdict, text: &str) -> anyhow::Result<()> {
+        self.found.push(verdict);
+        let word = match verdict {
+            Verdict::Good => "good",
+            Verdict::Missing => "missing",
+            Verdict::Suspicious => "suspicious",
+            Verdict::Fault => "FAULT",
+        };
+        terminal::print(&format!("{word:<11} {}\n", printable(text)))
+    }
+
+    /// A line that is not of the suite: the plugin's.
+    fn printed(&mut self, line: &str) -> anyhow::Result<()> {
+        if self.prints || line.trim().is_empty() {
+            return Ok(());
+        }
+        self.prints = true;
+        let text = format!("it prints to standard output, into the results of commands: `{line}`");
+        self.find(Verdict::Suspicious, &text)
+    }
+
+    fn count(&self, verdict: Verdict) -> usize {
+        self.found.iter().filter(|v| **v == verdict).count()
+    }
+
+    fn sum_up(&self) -> anyhow::Result<()> {
+        let count = |verdict| self.count(verdict);
+        terminal::print(&format!(
+            "{} good, {} missing, {} suspicious, {} faults\n",
+            count(Verdict::Good),
+            count(Verdict::Missing),
+            count(Verdict::Suspicious),
+            count(Verdict::Fault)
+        ))
+    }
+}
+
+/// How a process died, in words.
+fn death(status: ExitStatus) -> String {
+    #[cfg(unix)]
+    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
+        let meaning = match signal {
+            4 => "illegal instruction",
+            6 => "abort: an uncaught exception, a failed assertion or a panic",
+            7 => "bus error",
+            8 => "arithmetic error",
+            9 => "killed",
+            11 => "segmentation fault: memory that is not there",
+            _ => "a signal",
+        };
+        return format!("it crashes ({meaning}, signal {signal})");
+    }
+    match status.code() {
+        Some(code) => format!("it ends the program with exit code {code}"),
+        None => "it ends the program".to_string(),
+    }
+}

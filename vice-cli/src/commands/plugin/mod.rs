@@ -1,0 +1,24 @@
+//! `vice plugin`.
+
+mod check;
+mod child;
+mod new;
+mod project;
+
+use crate::terminal::Outcome;
+
+/// What to do with plugins.
+#[derive(Debug, clap::Subcommand)]
+pub(crate) enum Command {
+    /// Try all that a plugin should do on one of its data sets, and say what is wrong.
+    Check(Box<check::Args>),
+    /// Write the project of a new plugin, which works and has a test.
+    New(new::Args),
+}
+
+pub(crate) fn run(command: &Command) -> anyhow::Result<Outcome> {
+    match command {
+        Command::Check(args) => check::run(args),
+        Command::New(args) => new::run(args),
+    }
+}
