@@ -60,6 +60,35 @@ pub fn build(package: &str) -> PathBuf {
     folder
 }
 
+/// A plugin of the workspace as a library, built in this test's own profile.
+pub fn plugin(format: &str) -> PathBuf {
+    use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+    build(&format!("vice-plugin-{format}")).join(format!("{DLL_PREFIX}vice_adapter_{format}{DLL_SUFFIX}"))
+}
+
+/// Compiles a source of `tests/plugins` into a shared library `name` of a folder, with the system's C or C++ compiler.
+pub fn compile_plugin(source: &str, defines: &[&str], folder: &Path, name: &str) -> PathBuf {
+    let library = folder.join(format!("lib{name}{}", std::env::consts::DLL_SUFFIX));
+    let (variable, usual, standard) = match source.ends_with(".cpp") {
+        true => ("CXX", "c++", "-std=c++17"),
+        false => ("CC", "cc", "-std=gnu11"),
+    };
+    let compiler = std::env::var(variable).unwrap_or_else(|_| usual.to_string());
+    let output = Command::new(compiler)
+        .args([standard, "-O1", "-g", "-fPIC", "-shared", "-fvisibility=hidden"])
+        .args(defines.iter().map(|d| format!("-D{d}")))
+        .arg("-I")
+        .arg(root().join("adapters/abi/include"))
+        .arg("-o")
+        .arg(&library)
+        .arg(root().join("tests/plugins").join(source))
+        .arg("-lm")
+        .output()
+        .expect("the system has a C and a C++ compiler");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    library
+}
+
 /// The `vice` program, built once.
 pub fn vice_program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();

@@ -20,6 +20,9 @@ use crate::border::{self, Fault, MessageBuffer};
 use crate::library::Library;
 use crate::values;
 
+/// What stands with an error that breaks the contract, in place of a cause in the data.
+pub(crate) const MISTAKE: &str = "a mistake of the plugin";
+
 /// A structure that a call fills: valid when it is all zero.
 trait Answer {
     fn owner(&self) -> *mut c_void;
@@ -56,9 +59,7 @@ fn ask<T: Answer, R>(
     call: impl FnOnce(*mut T, *mut Message) -> i32,
     take: impl FnOnce(&T) -> Result<R, Fault>,
 ) -> DataResult<Option<R>> {
-    let bug = |text: String| {
-        DataError::new(format!("{}: {text}", what())).at(&library.path).hint("a mistake of the plugin")
-    };
+    let bug = |text: String| DataError::new(format!("{}: {text}", what())).at(&library.path).hint(MISTAKE);
     let mut buffer = MessageBuffer::new();
     let mut message = buffer.message();
     // SAFETY: each answer is a structure of numbers and pointers, or a pointer.
@@ -93,7 +94,7 @@ fn must<T: Answer, R>(
     ask(library, what, call, take)?.ok_or_else(|| {
         DataError::new(format!("{}: the call returned VICE_NONE, which it must not", what()))
             .at(&library.path)
-            .hint("a mistake of the plugin")
+            .hint(MISTAKE)
     })
 }
 
@@ -360,7 +361,7 @@ impl Dataset for PluginDataset {
         let Some(call) = self.library.calls.optional.relative_motions else {
             return Err(DataError::new(format!("{}: the call `relative_motions` is null", what()))
                 .at(&self.library.path)
-                .hint("a mistake of the plugin"));
+                .hint(MISTAKE));
         };
         must(
             &self.library,

@@ -21,6 +21,9 @@ pub(crate) struct Context {
     host: Host,
 }
 
+/// What was handed to libraries: kept where a search for lost memory finds it.
+static KEPT: Mutex<Vec<&'static Context>> = Mutex::new(Vec::new());
+
 // SAFETY: the pointer in `host` goes to this context itself, whose state is behind a lock.
 unsafe impl Send for Context {}
 // SAFETY: as above.
@@ -40,6 +43,7 @@ impl Context {
             },
         }));
         context.host.context = std::ptr::from_mut(context).cast();
+        KEPT.lock().unwrap_or_else(PoisonError::into_inner).push(context);
         context
     }
 

@@ -187,11 +187,11 @@ fn entry(path: &Path) -> DataResult<Entry> {
     #[cfg(not(unix))]
     let library = unsafe { libloading::Library::new(path) };
     let library = library.map_err(failed)?;
-    // Never unloaded: thread-locals and static variables of Rust and C++ are destroyed later than that.
-    let library: &'static libloading::Library = Box::leak(Box::new(library));
     // SAFETY: the contract says what the symbol is.
-    let entry = unsafe { library.get::<Entry>(contract::ENTRY_SYMBOL) };
-    entry.map(|symbol| *symbol).map_err(|e| {
+    let entry = unsafe { library.get::<Entry>(contract::ENTRY_SYMBOL) }.map(|symbol| *symbol);
+    // Never unloaded: thread-locals and static variables of Rust and C++ are destroyed later than that.
+    std::mem::forget(library);
+    entry.map_err(|e| {
         DataError::new(format!("has no symbol {}", contract::ENTRY_SYMBOL))
             .at(path)
             .hint("is it a plugin of VICE? C++: VICE_PLUGIN(...), Rust: vice_abi::export_plugin!(...)")

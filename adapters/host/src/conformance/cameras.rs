@@ -134,7 +134,7 @@ impl Check<'_> {
                 Err(error) => {
                     failed += 1;
                     if failed == 1 {
-                        self.suspicious(format!("image {place} of camera {name}: {}", line_of(&error)));
+                        self.error(&format!("image {place} of camera {name}"), &error);
                     }
                 }
             }

@@ -18,6 +18,7 @@ use vice_core::dataset::{Dataset, DatasetFactory, OpenOptions};
 use vice_core::error::DataError;
 use vice_core::time::Stamp;
 
+use crate::dataset::MISTAKE;
 use crate::library::Plugin;
 
 /// How a finding counts.
@@ -57,7 +58,7 @@ pub struct Thoroughness {
 
 impl Default for Thoroughness {
     fn default() -> Self {
-        Self { cycles: 1000, cycles_within: Duration::from_secs(120), images: 200, threads: 4 }
+        Self { cycles: 1000, cycles_within: Duration::from_secs(60), images: 200, threads: 4 }
     }
 }
 
@@ -150,6 +151,13 @@ impl Check<'_> {
 
     fn suspicious(&mut self, text: impl Into<String>) {
         self.find(Verdict::Suspicious, text);
+    }
+
+    /// An error where data may be missing, unless the adapter itself is at fault.
+    fn error(&mut self, place: &str, error: &DataError) {
+        let line = line_of(error);
+        let verdict = if line.contains(MISTAKE) { Verdict::Fault } else { Verdict::Suspicious };
+        self.find(verdict, format!("{place}: {line}"));
     }
 
     fn fault(&mut self, text: impl Into<String>) {

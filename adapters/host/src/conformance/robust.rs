@@ -2,7 +2,7 @@
 
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use vice_core::dataset::Dataset;
 use vice_core::error::DataResult;
@@ -97,6 +97,7 @@ impl Check<'_> {
         let settled = (cycles / 5).min(50);
         let mut at_settled = None;
         let mut done = 0;
+        let mut told = start;
         while done < cycles && start.elapsed() < self.thorough.cycles_within {
             let Some(dataset) = self.open_again() else { return };
             if let Some(camera) = &camera {
@@ -108,7 +109,8 @@ impl Check<'_> {
             if done == settled {
                 at_settled = Some((resident_bytes(), open_files()));
             }
-            if done % 100 == 0 {
+            if told.elapsed() > Duration::from_secs(1) {
+                told = Instant::now();
                 self.step(format!("opening and closing, {done} of {cycles} times"));
             }
         }

@@ -16,6 +16,7 @@ impl Check<'_> {
             let (mut found, mut with_values) = (0_usize, 0_usize);
             let places = spread(camera.frames.len(), self.thorough.images);
             for place in &places {
+                self.step(format!("depth image {place} of camera {name}"));
                 match dataset.depth_image(name, *place) {
                     Ok(Some(depth)) => {
                         found += 1;
@@ -91,7 +92,7 @@ impl Check<'_> {
                         self.suspicious("the floor is steep in the world: does its z point up?");
                     }
                 }
-                Err(error) => self.suspicious(format!("no floor at the first frame: {}", line_of(&error))),
+                Err(error) => self.error("no floor at the first frame", &error),
             }
         }
         self.step("facts");

@@ -1,0 +1,85 @@
+//! Results through a plugin are byte for byte those of the format built in.
+
+use std::path::Path;
+
+use vice_tests::{plugin, shared, vice};
+
+use crate::plugin_hostile::text;
+
+/// Evaluates with and without the plugin and compares the documents.
+fn same(format: &str, dataset: &Path, more: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    let library = plugin(format);
+    let run = |name: &str, plugin: &[&str]| {
+        let out = folder.path().join(name);
+        let args = ["evaluate", text(dataset), "--json", text(&out)];
+        let run = vice(&[&args[..], more, plugin].concat());
+        assert_eq!(run.code, 0, "{format} {name}: {}{}", run.stdout, run.stderr);
+        (std::fs::read(&out).unwrap(), run.stderr)
+    };
+    let (built_in, said) = run("built_in.json", &[]);
+    let (through, said_through) = run("through.json", &["--plugin", text(&library)]);
+    assert!(built_in.len() > 1000);
+    assert!(built_in == through, "{format}: the documents differ");
+    assert_eq!(said, said_through, "{format}: the warnings differ");
+}
+
+#[test]
+fn euroc_through_its_plugin() {
+    let Some(data) = shared("data/euroc_v1_01") else { return };
+    let labels = data.join("labels/floor.csv");
+    let estimates = format!("imu-euler,{}", data.join("estimates/imu_euler.txt").display());
+    let args = ["--labels", text(&labels), "--estimate", &estimates, "--depth", "floor,zmap"];
+    same("euroc", &data, &args);
+}
+
+#[test]
+fn blackbird_through_its_plugin() {
+    let Some(data) = shared("data/blackbird") else { return };
+    let labels = data.join("labels.csv");
+    let flight = data.join("picasso/yawForward/maxSpeed1p0");
+    same(
+        "blackbird",
+        &flight,
+        &["--labels", text(&labels), "--estimate", "imu-euler", "--depth", "floor,zcam"],
+    );
+}
+
+#[test]
+fn locobot_through_its_plugin() {
+    let Some(data) = shared("data/locobot") else { return };
+    let labels = data.join("labels.csv");
+    for recording in ["locobot_ros1.bag", "locobot_ros2_mcap"] {
+        let args = ["--labels", text(&labels), "--estimate", "odom,slam", "--depth", "floor,zcam"];
+        same("locobot", &data.join(recording), &args);
+    }
+}
+
+#[test]
+fn information_and_images_through_plugins() {
+    for (format, path) in [
+        ("euroc", "data/euroc_v1_01"),
+        ("blackbird", "data/blackbird/picasso/yawForward/maxSpeed1p0"),
+        ("locobot", "data/locobot/locobot_ros1_compressed.bag"),
+    ] {
+        let Some(path) = shared(path) else { return };
+        let library = plugin(format);
+        let more = ["--plugin", text(&library)];
+        let (built_in, through) =
+            (vice(&["info", text(&path)]), vice(&[&["info", text(&path)], &more[..]].concat()));
+        assert_eq!((built_in.code, through.code), (0, 0), "{format}: {}", through.stderr);
+        assert_eq!(built_in.stdout, through.stdout, "{format}");
+    }
+    let Some(data) = shared("data/euroc_v1_01") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let library = plugin("euroc");
+    let depth = |name: &str, more: &[&str]| {
+        let out = folder.path().join(name);
+        let args =
+            ["depth", text(&data), "--at", "1403715280562142976", "--source", "floor", "--out", text(&out)];
+        let run = vice(&[&args[..], more].concat());
+        assert_eq!(run.code, 0, "{}", run.stderr);
+        ["image.png", "floor.npy"].map(|f| std::fs::read(out.join(f)).unwrap())
+    };
+    assert!(depth("built_in", &[]) == depth("through", &["--plugin", text(&library)]));
+}
