@@ -7,12 +7,8 @@ mod outputs;
 mod streams;
 
 pub(crate) use depth::{AnchorArgs, DepthArgs, Scene};
-<<<<<<< HEAD
 pub(crate) use estimates::SceneEstimates;
-pub(crate) use open::{DatasetArgs, split_list};
-=======
 pub(crate) use open::{DatasetArgs, setting, split_list};
->>>>>>> 9e7bbdb (Load plugins: the host, three adapters as plugins, their check and new projects)
 pub(crate) use outputs::Outputs;
 pub(crate) use streams::{StreamArgs, load_streams};
 
