@@ -3,6 +3,9 @@
 // Helpers of tests fail their test.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr)]
 
+mod annotate;
+mod annotate_kill;
+mod annotator;
 mod bad_input;
 mod blackbird_oracle;
 mod camera_oracle;

@@ -40,7 +40,7 @@ const MAX_BODY: usize = 1 << 20;
 /// Bytes of an import.
 const MAX_IMPORT: usize = 64 << 20;
 /// How long after a change the labels file is written.
-const SAVE_DELAY: Duration = Duration::from_secs(1);
+const SAVE_DELAY: Duration = Duration::from_millis(300);
 /// How long open connections may take to end.
 const GRACE: Duration = Duration::from_secs(2);
 
