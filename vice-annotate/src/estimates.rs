@@ -85,6 +85,10 @@ pub trait Estimates: Send + Sync {
     /// [`vice_core::error::DataError`] if the data behind the depth source cannot be read.
     fn depths(&self, frame: usize, pixels: &[Pixel]) -> DataResult<Vec<Option<f64>>>;
 
+    /// Whether what is seen at pixels of a frame is the floor, as far as a depth camera or a scan of the scene can tell;
+    /// `None` where there is neither, or depth does not come from the floor. Asked once for many pixels.
+    fn on_floor(&self, frame: usize, pixels: &[Pixel]) -> Option<Vec<bool>>;
+
     /// Where a stream expects the point in frame `to` that is seen at a pixel of frame `from`.
     fn expect(&self, from: usize, px: Pixel, to: usize) -> Option<Pixel>;
 }

@@ -202,7 +202,7 @@ fn only_the_holder_of_the_token_may_ask_and_only_from_here() {
         assert!(matches!(ask(path, &format!("Host: {host}\r\n{known}")).status, 400 | 404), "{path}");
     }
     bad(&annotator.get(&format!("/api/frames/{FRAMES}")), 404, "does not exist");
-    let much = format!("{{\"revision\": 0, \"edits\": [], \"x\": \"{}\"}}", "x".repeat(2 << 20));
+    let much = format!("{{\"revision\": 0, \"edits\": [], \"x\": \"{}\"}}", "x".repeat((1 << 20) + 4096));
     assert_eq!(annotator.post("/api/edits", &much).status, 413);
 }
 

@@ -18,6 +18,7 @@ use vice_core::camera::Pixel;
 use super::App;
 use super::error::ApiError;
 use super::wire::{ChangeWire, FrameWire, StateWire, points};
+use crate::desk::Desk;
 use crate::exchange::{Exchange, ImportError, import};
 use crate::jobs::{JobState, Jobs, Listener, TrackRequest};
 use crate::store::{By, Changed, Edit, Store, StoreError, lock};
@@ -197,12 +198,17 @@ pub(super) async fn suggestions(State(app): Shared, Query(query): Query<SuggestQ
             desk.estimates.as_ref()?.depths(query.frame, pixels).ok()
         };
         let has_depth = |px: Pixel| depth(&[px]).is_none_or(|z| z.iter().all(Option::is_some));
-        let options = SuggestOptions { taken: &taken, accept: &has_depth, ..SuggestOptions::default() };
-        let mut found = suggest(&image, count, &options);
-        if found.is_empty() {
-            // Points without depth are better than none: another frame of the segment may have it.
-            found = suggest(&image, count, &SuggestOptions { taken: &taken, ..SuggestOptions::default() });
-        }
+        let floor = FloorMask::new(desk, query.frame);
+        let on_floor = |px: Pixel| floor.as_ref().is_none_or(|f| f.holds(px)) && has_depth(px);
+        // Points off the floor are better than none, and so are those without depth: another frame may know it.
+        let accepts: [&dyn Fn(Pixel) -> bool; 3] = [&on_floor, &has_depth, &|_| true];
+        let found = accepts
+            .into_iter()
+            .map(|accept| {
+                suggest(&image, count, &SuggestOptions { taken: &taken, accept, ..SuggestOptions::default() })
+            })
+            .find(|found| !found.is_empty())
+            .unwrap_or_default();
         let pixels: Vec<Pixel> = found.iter().map(|s| s.px).collect();
         let depths = depth(&pixels).unwrap_or_else(|| vec![None; pixels.len()]);
         let list: Vec<_> = found
@@ -268,6 +274,38 @@ pub(super) async fn bring_in(State(app): Shared, Query(query): Query<FormatQuery
         app.told(&store, &changed)
     })
     .await
+}
+
+/// Where a frame shows the floor, on a grid: asking for each corner by itself would be slow.
+struct FloorMask {
+    columns: usize,
+    on: Vec<bool>,
+}
+
+impl FloorMask {
+    /// Pixels from one place of the grid to the next.
+    const STEP: u32 = 8;
+
+    fn new(desk: &Desk, frame: usize) -> Option<Self> {
+        let steps = |side: u32| (0..side).step_by(Self::STEP as usize).map(f64::from);
+        let columns = steps(desk.camera.width()).count();
+        let grid: Vec<Pixel> = steps(desk.camera.height())
+            .flat_map(|v| steps(desk.camera.width()).map(move |u| Pixel::new(u, v)))
+            .collect();
+        let on = desk.estimates.as_ref()?.on_floor(frame, &grid)?;
+        Some(Self { columns, on })
+    }
+
+    /// Whether the floor is seen on all sides of a pixel.
+    fn holds(&self, px: Pixel) -> bool {
+        let step = f64::from(Self::STEP);
+        let (column, row) = ((px.u.max(0.0) / step) as usize, (px.v.max(0.0) / step) as usize);
+        let at = |c: usize, r: usize| {
+            let place = r * self.columns + c.min(self.columns.saturating_sub(1));
+            self.on.get(place).or(self.on.last()).copied().unwrap_or(false)
+        };
+        [(0, 0), (1, 0), (0, 1), (1, 1)].iter().all(|(c, r)| at(column + c, row + r))
+    }
 }
 
 impl App {

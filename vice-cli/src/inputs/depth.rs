@@ -21,7 +21,7 @@ use super::{numbers, positive, span_not_negative, split_list};
 use crate::terminal::usage;
 
 /// How depth sources work, and the calibration.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Depth")]
 pub(crate) struct DepthArgs {
     /// Floor plane n·p + d = 0 in the world, instead of the data set's.

@@ -1,7 +1,7 @@
 //! Pose streams and depth for the annotator: its labels change while it runs.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use vice_annotate::estimates::{Dot, Estimates, ProjectedStream, Projections, SkipCount, StreamKind};
 use vice_core::camera::Pixel;
@@ -25,6 +25,9 @@ use crate::terminal::usage;
 /// Streams that belong to the labels' first key frame and last label.
 type LoadedFor = (Option<Stamp>, Option<Stamp>, Arc<LoadedStreams>);
 
+/// How far a surface may be from the floor to be taken for it: a share of the depth, and metres.
+const ON_FLOOR: (f64, f64) = (0.02, 0.03);
+
 /// The program's options, asked again whenever the labels change.
 pub(crate) struct SceneEstimates {
     dataset: Arc<dyn Dataset>,
@@ -33,6 +36,9 @@ pub(crate) struct SceneEstimates {
     calibration: Option<CalibrationFile>,
     floor: Option<Floor>,
     depth: Box<dyn DepthSource>,
+    depth_args: DepthArgs,
+    /// What is seen, where something knows; made when it is first asked.
+    surface: OnceLock<Option<Box<dyn DepthSource>>>,
     /// Whether dots are wanted: otherwise only depth is.
     projects: bool,
     /// Streams before anything is labelled.
@@ -85,6 +91,8 @@ impl SceneEstimates {
             calibration,
             floor,
             depth: source,
+            depth_args: depth_args.clone(),
+            surface: OnceLock::new(),
             projects: asked || depth.is_some(),
             first: Arc::new(first),
             loaded: Mutex::default(),
@@ -137,6 +145,41 @@ impl SceneEstimates {
             },
             &|_, _| {},
         )
+    }
+
+    fn ask(&self, source: &dyn DepthSource, frame: usize, pixels: &[Pixel]) -> DataResult<Vec<Option<f64>>> {
+        let stamp = self.used.frames[frame];
+        let keyframe = Keyframe {
+            stamp,
+            frame,
+            camera: &self.used.camera,
+            body_from_camera: self.body_from_camera(stamp)?,
+            world_from_camera: self.world_from_camera(self.first.anchor, frame),
+            floor: match self.floor {
+                Some(floor) => floor,
+                None => self.dataset.floor(stamp)?,
+            },
+        };
+        let depths = source.depths(&keyframe, pixels)?;
+        Ok(depths.into_iter().map(|d| d.ok().map(|d| d.z_m)).collect())
+    }
+
+    /// The depth camera, else the scan.
+    fn surface(&self) -> Option<&dyn DepthSource> {
+        let made = self.surface.get_or_init(|| {
+            let name = if self.dataset.has_depth(&self.used.name) { "zcam" } else { "zmap" };
+            if name == "zmap" && !self.dataset.cloud().is_ok_and(|c| c.is_some()) {
+                return None;
+            }
+            match self.depth_args.sources("--depth", &[name.to_string()], &self.dataset, &self.used.name) {
+                Ok(mut sources) => sources.pop(),
+                Err(error) => {
+                    tracing::warn!("suggested points may lie off the floor: {error:#}");
+                    None
+                }
+            }
+        });
+        made.as_deref()
     }
 
     fn kind(role: Role) -> StreamKind {
@@ -227,20 +270,18 @@ impl Estimates for SceneEstimates {
     }
 
     fn depths(&self, frame: usize, pixels: &[Pixel]) -> DataResult<Vec<Option<f64>>> {
-        let stamp = self.used.frames[frame];
-        let keyframe = Keyframe {
-            stamp,
-            frame,
-            camera: &self.used.camera,
-            body_from_camera: self.body_from_camera(stamp)?,
-            world_from_camera: self.world_from_camera(self.first.anchor, frame),
-            floor: match self.floor {
-                Some(floor) => floor,
-                None => self.dataset.floor(stamp)?,
-            },
+        self.ask(self.depth.as_ref(), frame, pixels)
+    }
+
+    fn on_floor(&self, frame: usize, pixels: &[Pixel]) -> Option<Vec<bool>> {
+        let surface = self.uses_floor().then(|| self.surface()).flatten()?;
+        let floor = self.depths(frame, pixels).ok()?;
+        let seen = self.ask(surface, frame, pixels).ok()?;
+        let near = |(floor, seen): (Option<f64>, Option<f64>)| match (floor, seen) {
+            (Some(floor), Some(seen)) => (floor - seen).abs() <= ON_FLOOR.0 * floor + ON_FLOOR.1,
+            _ => false,
         };
-        let depths = self.depth.depths(&keyframe, pixels)?;
-        Ok(depths.into_iter().map(|d| d.ok().map(|d| d.z_m)).collect())
+        Some(floor.into_iter().zip(seen).map(near).collect())
     }
 
     /// By the first stream, which is the reference where there is one.
