@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <locale>
 #include <sstream>
 
@@ -45,10 +46,11 @@ std::int64_t stamp_ns(const std::string &path, const Row &row, const std::string
     // What is finer than a nanosecond is cut off.
     fraction.resize(9, '0');
     digits += fraction;
-    if (digits.size() == 9 || digits.size() > 18) throw refuse();
+    constexpr std::int64_t MAX_NS = std::numeric_limits<std::int64_t>::max();
+    if (digits.size() == 9) throw refuse();
     std::int64_t nanos = 0;
     for (const char c : digits) {
-        if (c < '0' || c > '9') throw refuse();
+        if (c < '0' || c > '9' || nanos > (MAX_NS - (c - '0')) / 10) throw refuse();
         nanos = nanos * 10 + (c - '0');
     }
     return nanos;

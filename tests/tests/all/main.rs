@@ -19,5 +19,6 @@ mod plugin_hostile;
 mod plugin_new;
 mod plugin_places;
 mod plugin_results;
+mod plugin_tum;
 mod synthetic;
 mod trajectory_oracle;
