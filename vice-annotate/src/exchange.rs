@@ -98,7 +98,12 @@ pub enum ImportError {
 ///
 /// # Errors
 /// [`ImportError`] for a clash, labels of another camera or data set, or labels outside the image.
-pub fn import(labels: &LabelSet, document: &Document, desk: &Desk, replace: bool) -> Result<Vec<Cell>, ImportError> {
+pub fn import(
+    labels: &LabelSet,
+    document: &Document,
+    desk: &Desk,
+    replace: bool,
+) -> Result<Vec<Cell>, ImportError> {
     if let Some(camera) = labels.camera.as_deref().filter(|c| *c != desk.camera_name) {
         let here = &desk.camera_name;
         return Err(DataError::new(format!("these are labels of the camera {camera}, not of {here}")).into());

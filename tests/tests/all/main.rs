@@ -12,4 +12,5 @@ mod euroc_oracle;
 mod evaluate_oracle;
 mod locobot_oracle;
 mod synthetic;
+mod tracker_oracle;
 mod trajectory_oracle;

@@ -7,7 +7,9 @@ use vice_core::label::{Observation, ObservationSource, Provenance};
 
 use crate::desk::Desk;
 use crate::store::{Cell, Document};
-use crate::tracker::{DOUBT_CONFIDENCE, Outcome, PointTrack, Pyramid, TRACKER_VERSION, TrackError, TrackOptions};
+use crate::tracker::{
+    DOUBT_CONFIDENCE, Outcome, PointTrack, Pyramid, TRACKER_VERSION, TrackError, TrackOptions,
+};
 
 /// A point on its way through the frames.
 pub(super) struct Lane {
@@ -28,7 +30,11 @@ pub(super) struct Lane {
 /// What is known of a frame.
 #[derive(Clone, Copy, Debug)]
 enum Found {
-    Here { px: Pixel, confidence: f64, seeded: bool },
+    Here {
+        px: Pixel,
+        confidence: f64,
+        seeded: bool,
+    },
     /// The point was lost before: what an earlier track said of the frame is void.
     Nothing,
 }

@@ -202,7 +202,9 @@ fn check(desk: &Desk, store: &Store, request: &TrackRequest) -> DataResult<()> {
         }
         let frame = request.frame;
         let from = store.document().get(point, stamp).ok_or_else(|| {
-            DataError::new(format!("point {point} is not labelled in frame {frame}, where tracking should start"))
+            DataError::new(format!(
+                "point {point} is not labelled in frame {frame}, where tracking should start"
+            ))
         })?;
         if from.occluded {
             return Err(DataError::new(format!("point {point} is marked as occluded in frame {frame}")));

@@ -23,7 +23,8 @@ pub(super) fn legs(desk: &Desk, request: &TrackRequest) -> Vec<Vec<usize>> {
     let (Some(first), Some(last)) = (desk.chosen.first(), desk.chosen.last()) else { return vec![] };
     let start = request.frame;
     let forward = || {
-        let end = request.until.filter(|u| *u > start).unwrap_or(*last).min(desk.frames.len().saturating_sub(1));
+        let end =
+            request.until.filter(|u| *u > start).unwrap_or(*last).min(desk.frames.len().saturating_sub(1));
         (start + 1..=end).collect()
     };
     let backward = || {
@@ -39,7 +40,8 @@ pub(super) fn legs(desk: &Desk, request: &TrackRequest) -> Vec<Vec<usize>> {
 
 /// Tracks until every point's lane has ended, the job is stopped, or something cannot be written.
 pub(super) fn run(desk: &Desk, listener: &dyn Listener, job: &Job) {
-    let mut runner = Runner { desk, listener, job, last_batch: Instant::now(), remarks: BTreeMap::new(), bad_frames: 0 };
+    let mut runner =
+        Runner { desk, listener, job, last_batch: Instant::now(), remarks: BTreeMap::new(), bad_frames: 0 };
     let outcome = runner.run();
     let remarks = runner.remarks();
     job.update(listener, |state| {
@@ -79,7 +81,9 @@ impl Runner<'_> {
             for lane in &lanes {
                 let remark = match lane.fate {
                     Some(Fate::Lost(frame)) => format!("{} is lost in frame {frame}", lane.point),
-                    Some(Fate::LeftImage(frame)) => format!("{} leaves the image in frame {frame}", lane.point),
+                    Some(Fate::LeftImage(frame)) => {
+                        format!("{} leaves the image in frame {frame}", lane.point)
+                    }
                     Some(Fate::Void) => format!("{} was changed where tracking started", lane.point),
                     None => continue,
                 };

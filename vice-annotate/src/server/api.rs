@@ -113,7 +113,10 @@ pub(super) async fn state(State(app): Shared) -> Answer {
 pub(super) async fn frame(State(app): Shared, Path(frame): Path<usize>) -> Answer {
     if frame >= app.desk.frames.len() {
         let count = app.desk.frames.len();
-        return Err(ApiError::new(StatusCode::NOT_FOUND, format!("frame {frame} does not exist: there are {count}")));
+        return Err(ApiError::new(
+            StatusCode::NOT_FOUND,
+            format!("frame {frame} does not exist: there are {count}"),
+        ));
     }
     let picture = app.frames.get(frame).await?;
     let headers = [
@@ -246,9 +249,9 @@ pub(super) async fn bring_in(State(app): Shared, Query(query): Query<FormatQuery
     app.blocking(move |app| {
         let bytes = match request.encoding {
             Encoding::Text => request.content.into_bytes(),
-            Encoding::Base64 => {
-                STANDARD.decode(&request.content).map_err(|e| ApiError::bad(format!("the content is no base64: {e}")))?
-            }
+            Encoding::Base64 => STANDARD
+                .decode(&request.content)
+                .map_err(|e| ApiError::bad(format!("the content is no base64: {e}")))?,
         };
         let labels = format.read(&bytes, &app.desk.frames)?;
         let mut store = app.desk.store();

@@ -21,7 +21,9 @@ pub(super) fn asset(name: &str, token: &str) -> Option<Response> {
     let bytes = Page::get(name)?.data;
     let body = match std::str::from_utf8(&bytes) {
         Ok(text) if name.ends_with(".html") => with_token(text, &["src=\"", "href=\""], token).into_bytes(),
-        Ok(text) if name.ends_with(".js") => with_token(text, &["from \"", "import \"", "import(\""], token).into_bytes(),
+        Ok(text) if name.ends_with(".js") => {
+            with_token(text, &["from \"", "import \"", "import(\""], token).into_bytes()
+        }
         _ => bytes.into_owned(),
     };
     Some(([(header::CONTENT_TYPE, content_type)], body).into_response())
@@ -33,7 +35,8 @@ fn with_token(text: &str, marks: &[&str], token: &str) -> String {
     let mut rest = text;
     loop {
         let found = marks.iter().filter_map(|m| rest.find(m).map(|at| at + m.len())).min();
-        let Some((start, end)) = found.and_then(|start| Some((start, start + rest[start..].find('"')?))) else {
+        let Some((start, end)) = found.and_then(|start| Some((start, start + rest[start..].find('"')?)))
+        else {
             out.push_str(rest);
             return out;
         };

@@ -146,7 +146,8 @@ fn jpeg_size(bytes: &[u8]) -> Option<(u32, u32)> {
             // EXIF may say that the image is to be turned.
             0xe1 => return None,
             0xc0..=0xc2 => {
-                let number = |i: usize| Some(u32::from(u16::from_be_bytes(data.get(i..i + 2)?.try_into().ok()?)));
+                let number =
+                    |i: usize| Some(u32::from(u16::from_be_bytes(data.get(i..i + 2)?.try_into().ok()?)));
                 return Some((number(3)?, number(1)?));
             }
             0xda | 0xd9 => return None,
@@ -174,7 +175,8 @@ mod tests {
             wrong[at] ^= 1;
             assert_eq!(shown_as(&wrong, (7, 5)), None, "byte {at}");
         }
-        let jpeg = b"\xff\xd8\xff\xc0\x00\x0b\x08\x00\x05\x00\x07\x01\x01\x11\x00\xff\xda\x00\x02\x11\xff\xd9";
+        let jpeg =
+            b"\xff\xd8\xff\xc0\x00\x0b\x08\x00\x05\x00\x07\x01\x01\x11\x00\xff\xda\x00\x02\x11\xff\xd9";
         assert_eq!(shown_as(jpeg, (7, 5)), Some("image/jpeg"));
         assert_eq!(shown_as(&jpeg[..jpeg.len() - 1], (7, 5)), None);
         let turned = [&jpeg[..2], b"\xff\xe1\x00\x08Exif\0\0", &jpeg[2..]].concat();

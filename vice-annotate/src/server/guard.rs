@@ -74,13 +74,21 @@ impl Guard {
             return None;
         }
         // A browser always says where a write comes from; other programs need not.
-        let own = text(headers, &header::ORIGIN).is_none_or(|o| o.eq_ignore_ascii_case(&format!("http://{host}")));
+        let own =
+            text(headers, &header::ORIGIN).is_none_or(|o| o.eq_ignore_ascii_case(&format!("http://{host}")));
         let site = headers.get("sec-fetch-site").map(HeaderValue::as_bytes);
-        if !own || headers.get_all(header::ORIGIN).iter().count() > 1 || !matches!(site, None | Some(b"same-origin")) {
-            return Some(ApiError::new(StatusCode::FORBIDDEN, "only the annotator's own page may change labels"));
+        if !own
+            || headers.get_all(header::ORIGIN).iter().count() > 1
+            || !matches!(site, None | Some(b"same-origin"))
+        {
+            return Some(ApiError::new(
+                StatusCode::FORBIDDEN,
+                "only the annotator's own page may change labels",
+            ));
         }
-        let json = text(headers, &header::CONTENT_TYPE)
-            .is_some_and(|t| t.split(';').next().is_some_and(|t| t.trim().eq_ignore_ascii_case("application/json")));
+        let json = text(headers, &header::CONTENT_TYPE).is_some_and(|t| {
+            t.split(';').next().is_some_and(|t| t.trim().eq_ignore_ascii_case("application/json"))
+        });
         if !json && *request.method() != Method::DELETE {
             return Some(ApiError::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "send application/json"));
         }
@@ -123,7 +131,9 @@ mod tests {
         let guard = |address: &str| Guard { token: "t".into(), address: address.parse().unwrap() };
         let here = guard("127.0.0.1:8000");
         assert!(here.is_own_host("127.0.0.1:8000") && here.is_own_host("LOCALHOST:8000"));
-        for host in ["", "127.0.0.1", "127.0.0.1:8001", "evil.example:8000", "10.0.0.1:8000", "127.0.0.1.nip.io:8000"] {
+        for host in
+            ["", "127.0.0.1", "127.0.0.1:8001", "evil.example:8000", "10.0.0.1:8000", "127.0.0.1.nip.io:8000"]
+        {
             assert!(!here.is_own_host(host), "{host}");
         }
         assert!(guard("[::1]:8000").is_own_host("[::1]:8000"));

@@ -89,7 +89,9 @@ async fn run(desk: Desk, options: &ServerOptions, ready: impl FnOnce(&str)) -> D
     let failed = |e: std::io::Error| {
         let error = DataError::new(format!("cannot listen on {wanted}"));
         match e.kind() {
-            std::io::ErrorKind::AddrInUse => error.hint("another program uses this port; --port 0 takes a free one"),
+            std::io::ErrorKind::AddrInUse => {
+                error.hint("another program uses this port; --port 0 takes a free one")
+            }
             _ => error,
         }
         .because(e)
@@ -100,7 +102,10 @@ async fn run(desk: Desk, options: &ServerOptions, ready: impl FnOnce(&str)) -> D
     let address = listener.local_addr().map_err(failed)?;
     let token = guard::new_token()?;
     let shown = match address.ip() {
-        ip if ip.is_unspecified() => SocketAddr::new(if ip.is_ipv4() { [127, 0, 0, 1].into() } else { std::net::Ipv6Addr::LOCALHOST.into() }, address.port()),
+        ip if ip.is_unspecified() => SocketAddr::new(
+            if ip.is_ipv4() { [127, 0, 0, 1].into() } else { std::net::Ipv6Addr::LOCALHOST.into() },
+            address.port(),
+        ),
         _ => address,
     };
     let url = format!("http://{shown}/?token={token}");
@@ -205,9 +210,8 @@ impl StopSignal {
         #[cfg(unix)]
         {
             use tokio::signal::unix::{SignalKind, signal};
-            let listen = |kind| {
-                signal(kind).map_err(|e| DataError::new("signals cannot be listened to").because(e))
-            };
+            let listen =
+                |kind| signal(kind).map_err(|e| DataError::new("signals cannot be listened to").because(e));
             let kinds = [SignalKind::interrupt(), SignalKind::terminate(), SignalKind::hangup()];
             let [a, b, c] = kinds.map(listen);
             Ok(Self { signals: [a?, b?, c?] })

@@ -6,8 +6,8 @@ use serde::Serialize;
 use vice_core::label::{Observation, ObservationSource};
 use vice_core::time::Stamp;
 
-use crate::store::{Changed, Document, Store};
 use crate::jobs::JobState;
+use crate::store::{Changed, Document, Store};
 
 /// One observation.
 #[derive(Debug, Serialize)]

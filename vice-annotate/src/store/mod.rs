@@ -24,8 +24,8 @@ pub use edit::{Checks, Edit};
 pub use history::{By, History, Step};
 pub use journal::{FileMark, JOURNAL_SCHEMA};
 pub use open::Target;
-pub(crate) use save::{lock, save_now};
 pub use save::{SaveWork, Saver};
+pub(crate) use save::{lock, save_now};
 
 use document::{inverse, touched};
 use journal::{Journal, Line};
