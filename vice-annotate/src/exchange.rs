@@ -58,10 +58,7 @@ impl Exchange {
         let written = match self {
             Self::Json => write_json(&mut bytes, labels),
             Self::Csv => write_csv(&mut bytes, labels),
-            Self::Cvat => {
-                let size = (desk.camera.width(), desk.camera.height());
-                write_cvat(&mut bytes, labels, &desk.frames, size)
-            }
+            Self::Cvat => write_cvat(&mut bytes, labels, &desk.frames),
             Self::Pickle => return Err(DataError::new("a pickle is only read: choose json, csv or cvat")),
         };
         written.map_err(|e| DataError::new("the labels cannot be written").because(e))?;

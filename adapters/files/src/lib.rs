@@ -3,7 +3,7 @@
 //! | module | what |
 //! | --- | --- |
 //! | [`trajectory`] | poses as TUM, EuRoC, KITTI and relative motions; found out by content |
-//! | [`labels`] | labels as CSV, JSON `vice.labels/1`, and the pickle of the paper's authors |
+//! | [`labels`] | labels as CSV, JSON `vice.labels/1`, CVAT XML, and the pickle of the paper's authors |
 //! | [`calibration`] | TOML or Kalibr files that override intrinsics and extrinsics |
 //! | [`rigid_file`] | the place of an estimate's frame in the body |
 //! | [`image_file`] | PNG and JPEG |

@@ -21,4 +21,5 @@ mod plugin_places;
 mod plugin_results;
 mod plugin_tum;
 mod synthetic;
+mod tracker_oracle;
 mod trajectory_oracle;

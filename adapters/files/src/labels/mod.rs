@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | CSV | `point,timestamp_ns,u_px,v_px,keyframe` and optionally `source,flags`: the interchange form |
 //! | JSON | schema `vice.labels/1`, which also names the data set and the camera |
-//! | CVAT | XML of the annotation tool CVAT, tracks of points; where the annotator imports and exports |
+//! | CVAT | "CVAT for video 1.1", tracks of points, of the annotation tool CVAT; counts frames, as the pickle does |
 //! | pickle | `{point: {frame index: (array([x, y]), is_keyframe)}}`, as the paper's authors stored them; read only |
 
 mod csv_file;
@@ -41,6 +41,8 @@ pub enum LabelFormat {
     Json,
     /// The authors' pickle.
     Pickle,
+    /// "CVAT for video 1.1".
+    Cvat,
 }
 
 impl LabelFormat {
@@ -51,6 +53,7 @@ impl LabelFormat {
             // A dictionary in the protocols from 2 on, 1 and 0 of Python's pickle.
             [0x80, ..] | [b'}', ..] | [b'(', b'd', ..] => Self::Pickle,
             [b'{', ..] => Self::Json,
+            [b'<', ..] => Self::Cvat,
             _ => Self::Csv,
         }
     }
@@ -58,20 +61,26 @@ impl LabelFormat {
     /// The format that a file to be written is meant to have.
     ///
     /// # Errors
-    /// [`DataError`] if the extension is neither `csv` nor `json`.
+    /// [`DataError`] if the extension is none of `csv`, `json` and `xml`.
     pub fn for_writing(path: &Path) -> DataResult<Self> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
         match extension.to_ascii_lowercase().as_str() {
             "csv" => Ok(Self::Csv),
             "json" => Ok(Self::Json),
-            _ => Err(DataError::new("labels are written as .csv or .json, by the name's extension").at(path)),
+            "xml" => Ok(Self::Cvat),
+            _ => {
+                let problem =
+                    "labels are written as .csv or .json, or .xml for CVAT, by the name's extension";
+                Err(DataError::new(problem).at(path))
+            }
         }
     }
 }
 
 /// Reads a file of labels in the format its content shows.
 ///
-/// `frame_stamps` are the stamps of the camera's frames; only the authors' pickle, which counts frames, needs them.
+/// `frame_stamps` are the stamps of the camera's frames; only the authors' pickle and CVAT, which count frames, need
+/// them.
 ///
 /// # Errors
 /// [`DataError`] with path and line if the file cannot be read or a row cannot be used.
@@ -81,13 +90,19 @@ pub fn read(path: impl AsRef<Path>, frame_stamps: Option<&[Stamp]>) -> DataResul
     let labels = match LabelFormat::of_content(&bytes) {
         LabelFormat::Csv => read_csv(&bytes),
         LabelFormat::Json => read_json(&bytes),
-        LabelFormat::Pickle => match frame_stamps {
-            Some(stamps) => read_pickle(&bytes, stamps),
-            None => Err(DataError::new("a pickle counts frames, so their stamps are needed")
-                .hint("name the data set that it labels")),
-        },
+        LabelFormat::Pickle => {
+            frame_stamps.ok_or_else(|| counts_frames("a pickle")).and_then(|s| read_pickle(&bytes, s))
+        }
+        LabelFormat::Cvat => {
+            frame_stamps.ok_or_else(|| counts_frames("CVAT")).and_then(|s| read_cvat(&bytes, s))
+        }
     };
     labels.map_err(|e| e.at(path))
+}
+
+fn counts_frames(what: &str) -> DataError {
+    let problem = format!("{what} counts frames, so their stamps are needed");
+    DataError::new(problem).hint("name the data set that it labels")
 }
 
 /// Writes labels as CSV or JSON, by the extension, all or nothing. Sources and flags are kept.
@@ -95,11 +110,28 @@ pub fn read(path: impl AsRef<Path>, frame_stamps: Option<&[Stamp]>) -> DataResul
 /// # Errors
 /// [`DataError`] if the extension is another one, or the file cannot be written or may not be replaced.
 pub fn write(path: impl AsRef<Path>, labels: &LabelSet, overwrite: Overwrite) -> DataResult<()> {
+    write_with_frames(path, labels, None, overwrite)
+}
+
+/// The same, and as CVAT's XML for the extension `xml`, which needs the stamps of the camera's frames.
+///
+/// # Errors
+/// As [`write()`], and as [`write_cvat`].
+pub fn write_with_frames(
+    path: impl AsRef<Path>,
+    labels: &LabelSet,
+    frame_stamps: Option<&[Stamp]>,
+    overwrite: Overwrite,
+) -> DataResult<()> {
     let path = path.as_ref();
     let format = LabelFormat::for_writing(path)?;
+    if format == LabelFormat::Cvat && frame_stamps.is_none() {
+        return Err(counts_frames("CVAT").at(path));
+    }
     atomic::write(path, overwrite, |w: &mut dyn Write| -> io::Result<()> {
         match format {
             LabelFormat::Json => write_json(w, labels),
+            LabelFormat::Cvat => write_cvat(w, labels, frame_stamps.unwrap_or_default()),
             _ => write_csv(w, labels),
         }
     })

@@ -12,16 +12,17 @@ use crate::terminal::{self, Outcome};
 /// Arguments of `vice labels convert`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  vice labels convert floor.csv floor.json\n  \
-    vice labels convert labels.pickle labels.csv --dataset V1_01_easy\n\n\
-    The pickle counts frames; the data set says which stamps they have.")]
+    vice labels convert labels.pickle labels.csv --dataset V1_01_easy\n  \
+    vice labels convert labels.json cvat.xml --dataset V1_01_easy\n\n\
+    The pickle and CVAT count frames; the data set says which stamps they have.")]
 pub(crate) struct Args {
-    /// Labels to read: CSV, JSON (vice.labels/1) or the authors' pickle.
+    /// Labels to read: CSV, JSON (vice.labels/1), CVAT for video 1.1 or the authors' pickle.
     #[arg(value_name = "IN")]
     input: PathBuf,
-    /// File to write, .csv or .json.
+    /// File to write: .csv, .json, or .xml for CVAT.
     #[arg(value_name = "OUT")]
     output: PathBuf,
-    /// Data set whose frames a pickle counts.
+    /// Data set whose frames a pickle or CVAT counts.
     #[arg(long, value_name = "DATASET")]
     dataset: Option<PathBuf>,
     /// Camera of that data set [default: the first].
@@ -53,12 +54,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     // Before the work, so that a wrong name costs nothing.
     LabelFormat::for_writing(&args.output)?;
     let mut set = labels::read(&args.input, frames.as_ref().map(|(_, _, f)| f.as_ref()))?;
-    if let Some((dataset, camera, _)) = frames {
-        set.dataset.get_or_insert(dataset);
-        set.camera.get_or_insert(camera);
+    if let Some((dataset, camera, _)) = &frames {
+        set.dataset.get_or_insert_with(|| dataset.clone());
+        set.camera.get_or_insert_with(|| camera.clone());
     }
     let overwrite = if args.force { Overwrite::Replace } else { Overwrite::Refuse };
-    labels::write(&args.output, &set, overwrite)?;
+    let stamps = frames.as_ref().map(|(_, _, f)| f.as_ref());
+    labels::write_with_frames(&args.output, &set, stamps, overwrite)?;
     terminal::print(&format!("{} points, {} observations\n", set.points().len(), set.observation_count()))?;
     Ok(Outcome::Done)
 }
