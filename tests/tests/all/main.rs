@@ -11,6 +11,8 @@ mod blackbird_oracle;
 mod camera_oracle;
 mod commands;
 mod depth_oracle;
+mod detect;
+mod detect_rendered;
 mod euroc_oracle;
 mod evaluate_oracle;
 mod locobot_oracle;
