@@ -76,8 +76,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     let calibration = args.depth_options.calibration()?;
     let dataset = args.dataset.open()?;
     let used = args.dataset.used_camera(dataset.as_ref(), calibration.as_ref())?;
-    let window =
-        Window { fps: args.fps, start: args.start, duration: args.duration, ..Window::default() };
+    let window = Window { fps: args.fps, start: args.start, duration: args.duration, ..Window::default() };
     let chosen = window.frames(&used.frames);
     if chosen.is_empty() {
         return Err(usage(format!(
@@ -136,7 +135,6 @@ fn keys(args: &Args) -> anyhow::Result<BTreeMap<String, Vec<String>>> {
     let Some(path) = &args.server.keys else { return Ok(BTreeMap::new()) };
     let shown = || path.display().to_string();
     let text = std::fs::read_to_string(path).with_context(shown)?;
-    serde_json::from_str(&text).with_context(|| {
-        format!("{}: expected keys by action, such as {{\"next-frame\": [\"e\"]}}", shown())
-    })
+    serde_json::from_str(&text)
+        .with_context(|| format!("{}: expected keys by action, such as {{\"next-frame\": [\"e\"]}}", shown()))
 }

@@ -106,8 +106,9 @@ impl SceneEstimates {
             return Ok(Arc::clone(streams));
         }
         let calibration = self.calibration.as_ref();
-        let streams = load_streams(&self.args, self.dataset.as_ref(), &self.used, selection, calibration, false)
-            .map_err(|e| DataError::new(format!("{e:#}")))?;
+        let streams =
+            load_streams(&self.args, self.dataset.as_ref(), &self.used, selection, calibration, false)
+                .map_err(|e| DataError::new(format!("{e:#}")))?;
         let streams = Arc::new(streams);
         *loaded = Some((selection.first_keyframe(), last, Arc::clone(&streams)));
         Ok(streams)
@@ -212,7 +213,11 @@ impl Estimates for SceneEstimates {
                     .first
                     .list
                     .iter()
-                    .map(|s| ProjectedStream { name: s.name.clone(), kind: Self::kind(s.role), rmse_px: None })
+                    .map(|s| ProjectedStream {
+                        name: s.name.clone(),
+                        kind: Self::kind(s.role),
+                        rmse_px: None,
+                    })
                     .collect(),
                 ..Projections::default()
             }),

@@ -66,9 +66,19 @@ fn command(document: &ResultDocument) -> Option<String> {
         }
     }
     option("labels", &s.labels);
-    for name in
-        ["points", "estimate", "reference", "times", "initial-pose", "subsets", "cloud-voxel", "zcam-range"]
-    {
+    for name in [
+        "points",
+        "estimate",
+        "reference",
+        "times",
+        "initial-pose",
+        "subsets",
+        "observations",
+        "cloud-voxel",
+        "zcam-range",
+        "tag-size",
+        "tag-family",
+    ] {
         match other(name) {
             Some(value) => option(name, value),
             None if name == "estimate" => return None,
