@@ -1,6 +1,7 @@
 //! One file a command.
 
 pub(crate) mod annotate;
+pub(crate) mod compare;
 pub(crate) mod completions;
 pub(crate) mod convert;
 pub(crate) mod demo;
@@ -12,5 +13,7 @@ pub(crate) mod formats;
 pub(crate) mod info;
 pub(crate) mod labels;
 pub(crate) mod plugin;
+pub(crate) mod overlay;
+pub(crate) mod report;
 pub(crate) mod synth;
 pub(crate) mod trajectory;
