@@ -2,12 +2,14 @@
 
 mod depth;
 mod estimates;
+mod evaluation;
 mod open;
 mod outputs;
 mod streams;
 
 pub(crate) use depth::{AnchorArgs, DepthArgs, Scene};
 pub(crate) use estimates::SceneEstimates;
+pub(crate) use evaluation::{EvaluationArgs, Scoring};
 pub(crate) use open::{DatasetArgs, split_list};
 pub(crate) use outputs::Outputs;
 pub(crate) use streams::{StreamArgs, load_streams};

@@ -30,6 +30,9 @@ pub struct ResultDocument {
     pub pixel: Vec<PixelPart>,
     /// Estimates against the reference, where there is one.
     pub trajectory: Vec<TrajectoryPart>,
+    /// Where each stream went, for plots; empty where the samples were not asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub paths: Vec<PathPart>,
 }
 
 /// What was evaluated.
@@ -41,11 +44,20 @@ pub struct DatasetPart {
     pub format: String,
     /// The camera.
     pub camera: String,
+    /// Columns and rows of its images.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub image_size_px: Option<[u32; 2]>,
+    /// Its first frame, which plots count seconds from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first_frame_ns: Option<Stamp>,
 }
 
 /// How it was evaluated, as given or as chosen by default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
+    /// Path of the data set, as given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dataset: Option<String>,
     /// File of the labels.
     pub labels: String,
     /// Names of the points that take part.
@@ -128,8 +140,14 @@ pub struct KeyframePart {
     pub point: PointName,
     /// The frame.
     pub timestamp_ns: Stamp,
+    /// Where the label says the point is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub label_px: Option<Pixel>,
     /// Metres along the optical axis.
     pub depth_z_m: f64,
+    /// The lifted point in the stream's own world, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub point_world_m: Option<[f64; 3]>,
     /// The pixel's neighbourhood straddles a depth edge.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub on_edge: bool,
@@ -186,6 +204,46 @@ pub struct TrajectoryPart {
     /// Why the numbers are null, where they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub problem: Option<String>,
+    /// The errors over time, for plots; empty where the samples were not asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub frames: Vec<FrameError>,
+}
+
+/// The error of an estimate at a frame, after alignment.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FrameError {
+    /// The frame.
+    pub timestamp_ns: Stamp,
+    /// Distance of the positions, metres.
+    pub position_m: f64,
+    /// Angle between the orientations, radians.
+    pub angle_rad: f64,
+    /// Whether the frame is one of those that the numbers are made of; the others lie between them and fill the plot.
+    pub evaluated: bool,
+}
+
+/// Where a stream went between the first and the last evaluated frame, at frames of the camera.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PathPart {
+    /// Name of the pose stream.
+    pub stream: String,
+    /// Its role.
+    pub role: Role,
+    /// Whether the poses are in the world of the reference, after the alignment; else they are in the stream's own.
+    pub in_reference_world: bool,
+    /// The poses, in time.
+    pub poses: Vec<PathPose>,
+}
+
+/// A pose of the body.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PathPose {
+    /// The frame.
+    pub timestamp_ns: Stamp,
+    /// Position in the world, metres.
+    pub position_m: [f64; 3],
+    /// Orientation in the world, a unit quaternion w x y z.
+    pub rotation_wxyz: [f64; 4],
 }
 
 impl ResultDocument {

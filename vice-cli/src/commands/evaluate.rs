@@ -2,18 +2,11 @@
 
 use std::path::PathBuf;
 
-use vice_core::depth::DepthSource;
-use vice_core::evaluate::{EvaluateError, Evaluation, Observations, Selection, evaluate};
 use vice_core::metrics::align::Alignment;
-use vice_core::result::{ResultDocument, Settings};
 
-use vice_core::dataset::{Dataset, Floor};
-
-use crate::inputs::{
-    DatasetArgs, DepthArgs, LabelArgs, Outputs, StreamArgs, load_streams, split_list, to_json,
-};
+use crate::inputs::{EvaluationArgs, Outputs, Scoring, to_json};
 use crate::report;
-use crate::terminal::{self, Outcome, Verbosity, usage};
+use crate::terminal::{self, Outcome, Verbosity};
 
 /// Arguments of `vice evaluate`.
 #[derive(Debug, clap::Args)]
@@ -25,16 +18,7 @@ use crate::terminal::{self, Outcome, Verbosity, usage};
     times file, and relative motions as rel:FILE.")]
 pub(crate) struct Args {
     #[command(flatten)]
-    dataset: DatasetArgs,
-    #[command(flatten)]
-    labels: LabelArgs,
-    #[command(flatten)]
-    streams: StreamArgs,
-    /// Depth sources: floor, zmap, zcam, mesh, tag [default: floor].
-    #[arg(long, value_name = "SOURCE,...", help_heading = "Depth")]
-    depth: Vec<String>,
-    #[command(flatten)]
-    depth_options: DepthArgs,
+    evaluation: EvaluationArgs,
     #[command(flatten)]
     scoring: ScoringArgs,
     #[command(flatten)]
@@ -82,8 +66,14 @@ fn percent(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
-    let outputs = Outputs::new(&[&args.output.json, &args.output.csv, &args.output.latex], &inputs(args))?;
-    let document = document(args, verbosity)?;
+    let outputs =
+        Outputs::new(&[&args.output.json, &args.output.csv, &args.output.latex], &args.evaluation.files())?;
+    let scoring = Scoring {
+        subsets: args.scoring.subsets.iter().map(|n| usize::from(*n)).collect(),
+        align: args.scoring.align,
+        keep_samples: args.output.samples == "all",
+    };
+    let document = args.evaluation.evaluate(&scoring, verbosity)?.document;
     // All texts are made before the first is written, so that a failure leaves nothing half done.
     let json = args
         .output
@@ -112,137 +102,4 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         return Ok(Outcome::TooManySkips);
     }
     Ok(Outcome::Done)
-}
-
-fn document(args: &Args, verbosity: Verbosity) -> anyhow::Result<ResultDocument> {
-    let calibration = args.depth_options.calibration()?;
-    let floor = args.depth_options.floor()?;
-    let dataset = args.dataset.open()?;
-    let used = args.dataset.used_camera(dataset.as_ref(), calibration.as_ref())?;
-    tracing::info!(
-        "{} ({}): camera {} with {} frames",
-        dataset.name(),
-        dataset.format(),
-        used.name,
-        used.frames.len()
-    );
-    let labels = args.labels.read(&used.frames)?;
-    tracing::info!("{} points with {} labels", labels.points().len(), labels.observation_count());
-    let window = args.labels.window();
-    let in_labels = |error: EvaluateError| match error {
-        EvaluateError::Data(error) => anyhow::Error::new(error),
-        error => anyhow::Error::new(error).context(args.labels.labels.display().to_string()),
-    };
-    let selection = Selection::new(&labels, &used.frames, &used.camera, &window).map_err(in_labels)?;
-    let subsets: Vec<usize> = args.scoring.subsets.iter().map(|n| usize::from(*n)).collect();
-    if let Some(asked) = subsets.iter().find(|n| **n > selection.point_count()) {
-        let points = selection.point_count();
-        return Err(usage(EvaluateError::SubsetTooLarge { asked: *asked, points }.to_string()));
-    }
-    let world_depth = asks_for_the_world(args, dataset.as_ref(), &selection)?;
-    let streams =
-        load_streams(&args.streams, dataset.as_ref(), &used, &selection, calibration.as_ref(), world_depth)?;
-    for stream in &streams.list {
-        let t = &stream.trajectory;
-        tracing::info!("stream {}: {} poses, {} to {} ns", stream.name, t.len(), t.start(), t.end());
-    }
-    let sources = args.depth_options.sources("--depth", &args.depth, &dataset, &used.name)?;
-    let sources: Vec<&dyn DepthSource> = sources.iter().map(AsRef::as_ref).collect();
-    let settings = Settings {
-        labels: args.labels.labels.display().to_string(),
-        points: labels.points().iter().map(|p| p.name.clone()).collect(),
-        fps: args.labels.fps,
-        start_s: args.labels.start.as_secs_f64(),
-        duration_s: args.labels.duration.map(|d| d.as_secs_f64()),
-        max_gap_s: args.streams.max_gap.as_secs_f64(),
-        time_offset_s: streams.time_offset.as_secs_f64(),
-        align: args.scoring.align.name().to_string(),
-        anchor: streams.list[streams.anchor].name.clone(),
-        calibration: args.depth_options.calibration.as_ref().map(|p| p.display().to_string()),
-        floor_plane: args.depth_options.floor_plane,
-        zmap_occlusion: args.depth_options.zmap_occlusion,
-        estimate_frame: args.streams.estimate_frame.clone(),
-        other: other_settings(args),
-    };
-    let evaluation = Evaluation {
-        dataset: dataset.as_ref(),
-        camera_name: &used.name,
-        camera: &used.camera,
-        body_from_camera: used.body_from_camera,
-        frames: &used.frames,
-        selection: &selection,
-        streams: &streams.list,
-        anchor: streams.anchor,
-        depths: &sources,
-        floor,
-        max_gap: args.streams.max_gap,
-        subsets: (!subsets.is_empty()).then_some(subsets.as_slice()),
-        align: args.scoring.align,
-        keep_samples: args.output.samples == "all",
-        settings,
-    };
-    let bar = verbosity.progress("evaluating");
-    let document = evaluate(&evaluation, &|done, total| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
-    })?;
-    bar.finish_and_clear();
-    Ok(document)
-}
-
-/// Whether a depth source needs the camera's place in the world: a depth camera and a floor under the body do not.
-fn asks_for_the_world(args: &Args, dataset: &dyn Dataset, selection: &Selection<'_>) -> anyhow::Result<bool> {
-    let names = split_list(&args.depth);
-    let floor_in_world = || -> anyhow::Result<bool> {
-        let Some(stamp) = selection.first_keyframe() else { return Ok(true) };
-        Ok(args.depth_options.floor_plane.is_some() || matches!(dataset.floor(stamp)?, Floor::World(_)))
-    };
-    if names.iter().any(|n| n == "zmap" || n == "mesh") {
-        return Ok(true);
-    }
-    Ok((names.is_empty() || names.iter().any(|n| n == "floor")) && floor_in_world()?)
-}
-
-/// Options that have no field of their own in the document.
-fn other_settings(args: &Args) -> std::collections::BTreeMap<String, String> {
-    let mut other: std::collections::BTreeMap<String, String> =
-        args.dataset.settings.iter().map(|(key, value)| (format!("set {key}"), value.clone())).collect();
-    other.insert("estimate".to_string(), split_list(&args.streams.estimate).join(","));
-    if let Some(reference) = &args.streams.reference {
-        other.insert("reference".to_string(), reference.clone());
-    }
-    if let Some(times) = &args.streams.times {
-        other.insert("times".to_string(), times.display().to_string());
-    }
-    if let Some(pose) = &args.streams.initial_pose {
-        other.insert("initial-pose".to_string(), pose.map(|v| v.to_string()).join(","));
-    }
-    if !args.scoring.subsets.is_empty() {
-        let sizes: Vec<String> = args.scoring.subsets.iter().map(u16::to_string).collect();
-        other.insert("subsets".to_string(), sizes.join(","));
-    }
-    if args.labels.observations != Observations::All {
-        other.insert("observations".to_string(), args.labels.observations.name().to_string());
-    }
-    if let Some(voxel_m) = args.depth_options.cloud_voxel {
-        other.insert("cloud-voxel".to_string(), voxel_m.to_string());
-    }
-    if let Some([near, far]) = args.depth_options.zcam_range {
-        other.insert("zcam-range".to_string(), format!("{near},{far}"));
-    }
-    if let Some(size_m) = args.depth_options.tag_size {
-        other.insert("tag-size".to_string(), size_m.to_string());
-        other.insert("tag-family".to_string(), args.depth_options.tag_family.name().to_string());
-    }
-    other
-}
-
-/// What is read, and so must not be written over: files, and the whole data set.
-fn inputs(args: &Args) -> Vec<PathBuf> {
-    let mut inputs = vec![args.dataset.path.clone(), args.labels.labels.clone()];
-    let specs = split_list(&args.streams.estimate).into_iter().chain(args.streams.reference.clone());
-    inputs.extend(specs.map(|spec| PathBuf::from(spec.strip_prefix("rel:").unwrap_or(&spec))));
-    inputs.extend(args.streams.times.iter().chain(&args.depth_options.calibration).cloned());
-    inputs.push(PathBuf::from(&args.streams.estimate_frame));
-    inputs
 }

@@ -9,6 +9,7 @@
 //!
 //! No image is decoded on the way.
 
+mod curves;
 mod score;
 mod select;
 mod streams;
@@ -27,9 +28,7 @@ use crate::error::{DataError, DataResult};
 use crate::frames::BodyFromCamera;
 use crate::metrics::align::Alignment;
 use crate::metrics::pixel::{pooled_rmse_px, subset_rmse_px};
-use crate::result::{
-    DatasetPart, PixelPart, PointName, ResultDocument, SCHEMA, Settings, Skip, TrajectoryPart,
-};
+use crate::result::{DatasetPart, PixelPart, PointName, ResultDocument, SCHEMA, Settings, Skip};
 use crate::time::{Span, Stamp};
 use crate::trajectory::NoPose;
 
@@ -288,6 +287,7 @@ pub fn evaluate(
             progress(done, total);
         }
     }
+    let (trajectory, paths) = curves::trajectories(evaluation);
     Ok(ResultDocument {
         schema: SCHEMA.to_string(),
         vice_version: env!("CARGO_PKG_VERSION").to_string(),
@@ -295,10 +295,13 @@ pub fn evaluate(
             name: evaluation.dataset.name().to_string(),
             format: evaluation.dataset.format().to_string(),
             camera: evaluation.camera_name.to_string(),
+            image_size_px: Some([evaluation.camera.width(), evaluation.camera.height()]),
+            first_frame_ns: evaluation.frames.first().copied(),
         },
         settings: evaluation.settings.clone(),
         pixel,
-        trajectory: trajectory_parts(evaluation),
+        trajectory,
+        paths,
     })
 }
 
@@ -384,19 +387,6 @@ fn keyframe_depths(
 /// Position of a frame among the selected ones, which hold every frame that a segment names.
 fn position(selected: &[usize], frame: usize) -> usize {
     selected.partition_point(|f| *f < frame)
-}
-
-fn trajectory_parts(evaluation: &Evaluation<'_>) -> Vec<TrajectoryPart> {
-    let Some(reference) = evaluation.streams.iter().find(|s| s.role == crate::result::Role::Reference) else {
-        return vec![];
-    };
-    let stamps: Vec<Stamp> = evaluation.selection.in_window.iter().map(|f| evaluation.frames[*f]).collect();
-    evaluation
-        .streams
-        .iter()
-        .filter(|s| s.role == crate::result::Role::Estimate)
-        .map(|estimate| streams::compare(reference, estimate, &stamps, evaluation.max_gap, evaluation.align))
-        .collect()
 }
 
 fn skip(point: &PointName, stamp: Stamp, reason: SkipReason) -> Skip {

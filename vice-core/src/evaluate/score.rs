@@ -91,7 +91,9 @@ impl Scorer<'_> {
         scored.keyframes.push(KeyframePart {
             point: name.clone(),
             timestamp_ns: keyframe.observation.stamp,
+            label_px: Some(keyframe.observation.px),
             depth_z_m: depth.z_m,
+            point_world_m: Some(at_keyframe.transform_point(&point_camera_m).coords.into()),
             on_edge: depth.on_edge,
         });
         for sample in &segment.samples {

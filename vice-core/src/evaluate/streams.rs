@@ -2,7 +2,7 @@
 
 use super::EvaluateError;
 use crate::frames::WorldFromBody;
-use crate::metrics::align::{Alignment, align};
+use crate::metrics::align::{Alignment, ReferenceFromEstimate, align};
 use crate::metrics::associate::PosePairs;
 use crate::metrics::trajectory::Summary;
 use crate::result::{Role, TrajectoryPart};
@@ -39,19 +39,15 @@ impl Stream {
     }
 }
 
-/// RMSE_3D, AOE and ROE at the stamps where both streams have a pose, after alignment.
+/// RMSE_3D, AOE and ROE at the stamps where both streams have a pose, after alignment; and that alignment.
 pub(super) fn compare(
     reference: &Stream,
     estimate: &Stream,
     stamps: &[Stamp],
     max_gap: Span,
     alignment: Alignment,
-) -> TrajectoryPart {
-    let at_both = stamps.iter().filter_map(|stamp| {
-        let pose = reference.trajectory.pose_at(*stamp, max_gap).ok()?;
-        Some((*stamp, pose, estimate.trajectory.pose_at(*stamp, max_gap).ok()?))
-    });
-    let at_both: Vec<_> = at_both.collect();
+) -> (TrajectoryPart, Option<ReferenceFromEstimate>) {
+    let at_both = at_both(reference, estimate, stamps, max_gap);
     let mut part = TrajectoryPart {
         estimate: estimate.name.clone(),
         reference: reference.name.clone(),
@@ -61,17 +57,36 @@ pub(super) fn compare(
         aoe_rad: None,
         roe_rad: None,
         problem: None,
+        frames: vec![],
     };
-    let summary = PosePairs::new(at_both)
-        .and_then(|pairs| Ok(align(&pairs, alignment, None)?.apply_to(&pairs)))
-        .and_then(|aligned| Summary::of(&aligned));
-    match summary {
-        Ok(summary) => {
+    let found = PosePairs::new(at_both).and_then(|pairs| {
+        let transform = align(&pairs, alignment, None)?;
+        Ok((Summary::of(&transform.apply_to(&pairs))?, transform))
+    });
+    match found {
+        Ok((summary, transform)) => {
             part.rmse_3d_m = Some(summary.rmse_3d_m);
             part.aoe_rad = Some(summary.aoe_rad);
             part.roe_rad = summary.roe_rad;
+            (part, Some(transform))
         }
-        Err(error) => part.problem = Some(error.to_string()),
+        Err(error) => {
+            part.problem = Some(error.to_string());
+            (part, None)
+        }
     }
-    part
+}
+
+/// The poses of two streams at the stamps where both have one.
+pub(super) fn at_both(
+    reference: &Stream,
+    estimate: &Stream,
+    stamps: &[Stamp],
+    max_gap: Span,
+) -> Vec<(Stamp, WorldFromBody, WorldFromBody)> {
+    let pair = |stamp: &Stamp| {
+        let pose = reference.trajectory.pose_at(*stamp, max_gap).ok()?;
+        Some((*stamp, pose, estimate.trajectory.pose_at(*stamp, max_gap).ok()?))
+    };
+    stamps.iter().filter_map(pair).collect()
 }

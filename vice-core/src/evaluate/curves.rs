@@ -1,0 +1,97 @@
+//! What plots need beside the numbers: errors over time, and where each stream went.
+
+use std::collections::BTreeSet;
+
+use super::streams::{at_both, compare};
+use super::{Evaluation, Stream};
+use crate::frames::WorldFromBody;
+use crate::metrics::align::ReferenceFromEstimate;
+use crate::metrics::associate::PosePairs;
+use crate::metrics::trajectory::ApeErrors;
+use crate::result::{FrameError, PathPart, PathPose, Role, TrajectoryPart};
+use crate::time::Stamp;
+
+/// About as many frames as a plot can show.
+const MAX_FRAMES: usize = 600;
+
+/// The estimates against the reference, where there is one, and the paths of all streams.
+pub(super) fn trajectories(evaluation: &Evaluation<'_>) -> (Vec<TrajectoryPart>, Vec<PathPart>) {
+    let stamps: Vec<Stamp> = evaluation.selection.in_window.iter().map(|f| evaluation.frames[*f]).collect();
+    let shown = if evaluation.keep_samples { shown_stamps(evaluation) } else { vec![] };
+    let evaluated: BTreeSet<Stamp> = stamps.iter().copied().collect();
+    let reference = evaluation.streams.iter().find(|s| s.role == Role::Reference);
+    let (mut parts, mut paths) = (vec![], vec![]);
+    for stream in evaluation.streams {
+        let mut transform = None;
+        if let (Some(reference), Role::Estimate) = (reference, stream.role) {
+            let (mut part, found) = compare(reference, stream, &stamps, evaluation.max_gap, evaluation.align);
+            if let Some(found) = &found {
+                part.frames = frame_errors(evaluation, (reference, stream), found, &shown, &evaluated);
+            }
+            parts.push(part);
+            transform = found;
+        }
+        if evaluation.keep_samples {
+            paths.push(path(evaluation, stream, transform.as_ref(), &shown));
+        }
+    }
+    (parts, paths)
+}
+
+/// The evaluated frames, and some of those between them.
+fn shown_stamps(evaluation: &Evaluation<'_>) -> Vec<Stamp> {
+    let selected = &evaluation.selection.in_window;
+    let (Some(first), Some(last)) = (selected.first(), selected.last()) else { return vec![] };
+    let step = (last - first).div_ceil(MAX_FRAMES).max(1);
+    let frames: BTreeSet<usize> = (*first..=*last).step_by(step).chain(selected.iter().copied()).collect();
+    frames.into_iter().map(|f| evaluation.frames[f]).collect()
+}
+
+fn frame_errors(
+    evaluation: &Evaluation<'_>,
+    (reference, estimate): (&Stream, &Stream),
+    transform: &ReferenceFromEstimate,
+    shown: &[Stamp],
+    evaluated: &BTreeSet<Stamp>,
+) -> Vec<FrameError> {
+    let Ok(pairs) = PosePairs::new(at_both(reference, estimate, shown, evaluation.max_gap)) else {
+        return vec![];
+    };
+    let errors = ApeErrors::of(&transform.apply_to(&pairs));
+    let both = errors.translation_m.iter().zip(&errors.rotation_rad);
+    pairs
+        .stamps()
+        .iter()
+        .zip(both)
+        .map(|(stamp, (position_m, angle_rad))| FrameError {
+            timestamp_ns: *stamp,
+            position_m: *position_m,
+            angle_rad: *angle_rad,
+            evaluated: evaluated.contains(stamp),
+        })
+        .collect()
+}
+
+fn path(
+    evaluation: &Evaluation<'_>,
+    stream: &Stream,
+    transform: Option<&ReferenceFromEstimate>,
+    shown: &[Stamp],
+) -> PathPart {
+    let placed = |pose: WorldFromBody| transform.map_or(pose, |t| t.apply(&pose));
+    let pose = |stamp: &Stamp| {
+        let pose = placed(stream.trajectory.pose_at(*stamp, evaluation.max_gap).ok()?);
+        let (position, rotation) = (pose.translation(), pose.rotation());
+        Some(PathPose {
+            timestamp_ns: *stamp,
+            position_m: [position.x, position.y, position.z],
+            rotation_wxyz: [rotation.w, rotation.i, rotation.j, rotation.k],
+        })
+    };
+    PathPart {
+        stream: stream.name.clone(),
+        role: stream.role,
+        in_reference_world: transform.is_some() || stream.role == Role::Reference,
+        poses: shown.iter().filter_map(pose).collect(),
+    }
+}
