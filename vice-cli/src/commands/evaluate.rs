@@ -73,7 +73,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         align: args.scoring.align,
         keep_samples: args.output.samples == "all",
     };
-    let document = args.evaluation.evaluate(&scoring, verbosity)?.document;
+    let (document, _) = args.evaluation.evaluate(&scoring, verbosity)?;
     // All texts are made before the first is written, so that a failure leaves nothing half done.
     let json = args
         .output

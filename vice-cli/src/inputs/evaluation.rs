@@ -37,15 +37,13 @@ pub(crate) struct Scoring {
     pub(crate) keep_samples: bool,
 }
 
-/// What was found, and the open data set for those who show its images.
-pub(crate) struct Evaluated {
-    pub(crate) document: ResultDocument,
-    pub(crate) dataset: Arc<dyn Dataset>,
-}
-
 impl EvaluationArgs {
-    /// Runs the pipeline.
-    pub(crate) fn evaluate(&self, scoring: &Scoring, verbosity: Verbosity) -> anyhow::Result<Evaluated> {
+    /// Runs the pipeline; the data set comes with it for those who show its images.
+    pub(crate) fn evaluate(
+        &self,
+        scoring: &Scoring,
+        verbosity: Verbosity,
+    ) -> anyhow::Result<(ResultDocument, Arc<dyn Dataset>)> {
         let calibration = self.depth_options.calibration()?;
         let floor = self.depth_options.floor()?;
         let dataset = self.dataset.open()?;
@@ -119,7 +117,7 @@ impl EvaluationArgs {
             bar.set_position(done as u64);
         })?;
         bar.finish_and_clear();
-        Ok(Evaluated { document, dataset })
+        Ok((document, dataset))
     }
 
     /// Whether a depth source needs the camera's place in the world: a depth camera and a floor under the body do not.
