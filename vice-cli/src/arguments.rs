@@ -54,6 +54,8 @@ pub(crate) enum Command {
     Labels(commands::labels::Command),
     /// Write a pose stream of a data set as a trajectory file.
     Convert(commands::convert::Args),
+    /// Show result documents as a page with plots and images.
+    Report(commands::report::Args),
     /// Print completions for a shell.
     Completions(commands::completions::Args),
 }

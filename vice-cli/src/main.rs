@@ -34,6 +34,7 @@ fn main() -> ExitCode {
         Command::Synth(args) => commands::synth::run(args, verbosity),
         Command::Labels(args) => commands::labels::run(args, verbosity),
         Command::Convert(args) => commands::convert::run(args),
+        Command::Report(args) => commands::report::run(args, verbosity),
         Command::Completions(args) => commands::completions::run(args),
     };
     match outcome {

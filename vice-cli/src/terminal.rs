@@ -151,9 +151,13 @@ fn error_line(error: &anyhow::Error) -> String {
     line
 }
 
-/// Text from data made safe for a terminal: control characters would move its cursor or change its colours.
+/// Text from data made safe for a terminal: control characters would move its cursor or change its colours, and those
+/// that turn the direction of writing would show a name as another one.
 pub(crate) fn printable(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+    let turns =
+        |c: char| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let breaks = |c: char| matches!(c, '\u{2028}' | '\u{2029}');
+    text.chars().map(|c| if c.is_control() || turns(c) || breaks(c) { ' ' } else { c }).collect()
 }
 
 /// Whether the reader of standard output went away, as `head` does: no failure of ours.
@@ -184,5 +188,6 @@ mod tests {
         let twice = anyhow::anyhow!("same").context("same");
         assert_eq!(error_line(&twice), "same");
         assert_eq!(printable("a\u{1b}[31mb"), "a [31mb");
+        assert_eq!(printable("gpj.\u{202e}txt\u{2028}"), "gpj. txt ");
     }
 }

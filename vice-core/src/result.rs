@@ -247,6 +247,13 @@ pub struct PathPose {
 }
 
 impl ResultDocument {
+    /// Leaves out the scored samples and what only plots need, as if they had not been asked for.
+    pub fn drop_samples(&mut self) {
+        self.paths.clear();
+        self.pixel.iter_mut().for_each(|p| p.samples.clear());
+        self.trajectory.iter_mut().for_each(|t| t.frames.clear());
+    }
+
     /// Largest share of labels that could not be scored, over all parts, in percent. What a human left out, by a mark or by asking for
     /// manual labels only, does not count.
     pub fn worst_skipped_percent(&self) -> f64 {

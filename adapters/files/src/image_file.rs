@@ -4,8 +4,10 @@ use std::fs;
 use std::io::{self, Cursor};
 use std::path::Path;
 
+use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{DynamicImage, ExtendedColorType, ImageEncoder, ImageReader, Limits};
+use image::imageops::FilterType as Resampling;
+use image::{DynamicImage, ExtendedColorType, GrayImage, ImageEncoder, ImageReader, Limits, RgbImage};
 use vice_core::dataset::{DepthImage, Image, PixelFormat};
 use vice_core::error::{DataError, DataResult};
 use vice_core::time::Stamp;
@@ -72,12 +74,53 @@ pub fn dimensions(path: impl AsRef<Path>) -> DataResult<(u32, u32)> {
 /// # Errors
 /// [`DataError`] if the encoder refuses, which a valid image gives no reason for.
 pub fn encode_png(image: &Image) -> DataResult<Vec<u8>> {
-    let colour = match image.format() {
-        PixelFormat::Gray8 => ExtendedColorType::L8,
-        PixelFormat::Rgb8 => ExtendedColorType::Rgb8,
-        other => return Err(DataError::new(format!("no PNG can be made of {other:?} pixels"))),
+    encode(image.data(), image.width(), image.height(), colour(image)?)
+}
+
+/// A JPEG of an image; `quality` from 1 to 100.
+///
+/// # Errors
+/// [`DataError`] if the encoder refuses: a JPEG has at most 65,535 columns and rows.
+pub fn encode_jpeg(image: &Image, quality: u8) -> DataResult<Vec<u8>> {
+    let mut bytes = Vec::new();
+    JpegEncoder::new_with_quality(&mut bytes, quality)
+        .write_image(image.data(), image.width(), image.height(), colour(image)?)
+        .map_err(|e| DataError::new("cannot be encoded as JPEG").because(e))?;
+    Ok(bytes)
+}
+
+/// A smaller copy with at most so many columns, its shape kept; what is small already is copied as it is.
+///
+/// # Errors
+/// [`DataError`] for pixels that are neither gray nor colour.
+pub fn shrink(image: &Image, max_columns: u32) -> DataResult<Image> {
+    let (width, height) = (image.width(), image.height());
+    if width <= max_columns || max_columns == 0 {
+        return Ok(image.clone());
+    }
+    let rows = (u64::from(height) * u64::from(max_columns) / u64::from(width)).max(1) as u32;
+    let wrong_size = || DataError::new("the image does not have the bytes of its size");
+    let data = image.data().to_vec();
+    let small = match image.format() {
+        PixelFormat::Gray8 => {
+            let gray = GrayImage::from_raw(width, height, data).ok_or_else(wrong_size)?;
+            image::imageops::resize(&gray, max_columns, rows, Resampling::Triangle).into_raw()
+        }
+        PixelFormat::Rgb8 => {
+            let rgb = RgbImage::from_raw(width, height, data).ok_or_else(wrong_size)?;
+            image::imageops::resize(&rgb, max_columns, rows, Resampling::Triangle).into_raw()
+        }
+        other => return Err(DataError::new(format!("{other:?} pixels cannot be made smaller"))),
     };
-    encode(image.data(), image.width(), image.height(), colour)
+    Image::new(max_columns, rows, image.format(), small)
+}
+
+fn colour(image: &Image) -> DataResult<ExtendedColorType> {
+    match image.format() {
+        PixelFormat::Gray8 => Ok(ExtendedColorType::L8),
+        PixelFormat::Rgb8 => Ok(ExtendedColorType::Rgb8),
+        other => Err(DataError::new(format!("no picture can be made of {other:?} pixels"))),
+    }
 }
 
 /// A 16 bit PNG of a depth image; no depth becomes 0.
@@ -179,6 +222,18 @@ mod tests {
         assert!(decode_depth_png(&png, Stamp::default(), 0.0).is_err());
         let eight = encode(&[1], 1, 1, ExtendedColorType::L8).unwrap();
         assert!(decode_depth_png(&eight, Stamp::default(), 0.001).is_err());
+    }
+
+    #[test]
+    fn a_smaller_picture_looks_the_same() {
+        let data: Vec<u8> = (0..120 * 80 * 3).map(|i| if i % 360 < 180 { 40 } else { 200 }).collect();
+        let image = Image::new(120, 80, PixelFormat::Rgb8, data).unwrap();
+        let small = shrink(&image, 30).unwrap();
+        assert_eq!((small.width(), small.height(), small.format()), (30, 20, PixelFormat::Rgb8));
+        assert_eq!((small.data()[0], small.data()[3 * 29]), (40, 200));
+        assert_eq!(shrink(&image, 500).unwrap(), image);
+        let back = decode(&encode_jpeg(&small, 80).unwrap()).unwrap();
+        assert!(back.data()[0].abs_diff(40) < 12 && back.data()[3 * 29].abs_diff(200) < 12);
     }
 
     #[test]

@@ -15,6 +15,9 @@ use vice_depth::{CloudOptions, FloorDepth, ZMapDepth, ZMapOptions, load_cloud};
 use vice_files::image_file::encode_png;
 use vice_synthetic::{Synthetic, SyntheticOptions, write_euroc};
 
+use super::report::with_progress;
+use crate::report::html::{IMAGE_BUDGET_BYTES, Run, render};
+use crate::report::numbers::{first_and_last, mean};
 use crate::report::overlay::{Canvas, Colour, ESTIMATE_GREEN, ESTIMATE_YELLOW, LABEL_BLUE};
 use crate::report::table;
 use crate::terminal::{self, Outcome, Verbosity};
@@ -47,7 +50,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         })?;
         bar.finish_and_clear();
     }
-    let document = evaluate_flight(&flight)?;
+    let document = evaluate_flight(&flight, args.out.as_deref())?;
     let mut text =
         "A 10 s flight through a rendered room; four points on the floor are followed.\n".to_string();
     text.push_str("Three estimates of its motion are evaluated with two sources of depth at key frames:\n\n");
@@ -60,6 +63,9 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         let picture = out.join("overlay.png");
         let bytes = draw(&flight, &document)?;
         vice_files::atomic::write(&picture, vice_files::atomic::Overwrite::Replace, |w| w.write_all(&bytes))?;
+        let shots = with_progress(&document, &flight, IMAGE_BUDGET_BYTES, verbosity);
+        let run = Run::new(document, shots);
+        crate::inputs::write_text(&out.join("report.html"), &render(&[run])?)?;
         text.push_str(&kept(out)?);
     } else {
         text.push_str("\nKeep the flight, the result and a picture with `vice demo --out demo_out`.\n");
@@ -68,7 +74,8 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     Ok(Outcome::Done)
 }
 
-fn evaluate_flight(flight: &Synthetic) -> anyhow::Result<ResultDocument> {
+/// Evaluates the flight; where it is kept, the document says where its files are.
+fn evaluate_flight(flight: &Synthetic, kept: Option<&Path>) -> anyhow::Result<ResultDocument> {
     let camera_name = flight.cameras().into_iter().next().context("the flight has a camera")?;
     let camera = flight.camera(&camera_name)?;
     let frames: Arc<[Stamp]> = flight.frames(&camera_name)?;
@@ -87,14 +94,22 @@ fn evaluate_flight(flight: &Synthetic) -> anyhow::Result<ResultDocument> {
     let floor = FloorDepth::new();
     let sources: [&dyn DepthSource; 2] = [&floor, &zmap];
     let max_gap = Span::from_millis(100);
+    let below = |name: String| kept.map_or_else(|| name.clone(), |out| out.join(&name).display().to_string());
+    let mut other = std::collections::BTreeMap::new();
+    if kept.is_some() {
+        let files = ESTIMATES.map(|(name, _)| below(format!("estimates/{name}.txt")));
+        other.insert("estimate".to_string(), files.join(","));
+    }
     let settings = Settings {
-        labels: "labels/floor.csv".to_string(),
+        dataset: kept.map(|out| out.display().to_string()),
+        labels: below("labels/floor.csv".to_string()),
         points: labels.points().iter().map(|p| p.name.clone()).collect(),
         max_gap_s: max_gap.as_secs_f64(),
         align: Alignment::Se3.name().to_string(),
         anchor: GROUND_TRUTH.to_string(),
         zmap_occlusion: true,
         estimate_frame: "body".to_string(),
+        other,
         ..Settings::default()
     };
     Ok(evaluate(
@@ -125,7 +140,8 @@ fn in_words(document: &ResultDocument) -> anyhow::Result<String> {
         part(document, stream, depth)?.pooled_rmse_px.with_context(|| format!("{stream} was not scored"))
     };
     let (exact, drift, clock) = (px("exact", "floor")?, px("drift", "floor")?, px("clock-offset", "floor")?);
-    let (drift_start, drift_end) = first_and_last(part(document, "drift", "floor")?)?;
+    let (drift_start, drift_end) =
+        first_and_last(part(document, "drift", "floor")?).context("no sample was scored")?;
     let (clock_slow, clock_fast) = quiet_and_fast(part(document, "clock-offset", "floor")?)?;
     let zmap = px("exact", "zmap")?;
     let mut text = String::from("What this shows\n");
@@ -156,37 +172,13 @@ fn part<'a>(document: &'a ResultDocument, stream: &str, depth: &str) -> anyhow::
         .with_context(|| format!("no result for {stream} with {depth}"))
 }
 
-/// Mean errors in the first and in the last fifth of the segments.
-fn first_and_last(part: &PixelPart) -> anyhow::Result<(f64, f64)> {
-    let (mut early, mut late) = (Vec::new(), Vec::new());
-    for (i, start) in part.keyframes.iter().enumerate() {
-        let next = part
-            .keyframes
-            .get(i + 1)
-            .filter(|n| n.point == start.point)
-            .map_or(Stamp::MAX, |n| n.timestamp_ns);
-        let inside = |s: &&vice_core::result::Sample| {
-            s.point == start.point && s.timestamp_ns > start.timestamp_ns && s.timestamp_ns < next
-        };
-        let errors: Vec<f64> = part.samples.iter().filter(inside).map(|s| s.error_px).collect();
-        let fifth = errors.len().div_ceil(5);
-        early.extend_from_slice(&errors[..fifth]);
-        late.extend_from_slice(&errors[errors.len() - fifth..]);
-    }
-    Ok((mean(&early)?, mean(&late)?))
-}
-
 /// Mean errors of the best and of the worst fifth of the samples.
 fn quiet_and_fast(part: &PixelPart) -> anyhow::Result<(f64, f64)> {
     let mut errors: Vec<f64> = part.samples.iter().map(|s| s.error_px).collect();
     errors.sort_by(f64::total_cmp);
     let fifth = errors.len().div_ceil(5);
-    Ok((mean(&errors[..fifth])?, mean(&errors[errors.len() - fifth..])?))
-}
-
-fn mean(values: &[f64]) -> anyhow::Result<f64> {
-    anyhow::ensure!(!values.is_empty(), "no sample was scored");
-    Ok(values.iter().sum::<f64>() / values.len() as f64)
+    let both = mean(&errors[..fifth]).zip(mean(&errors[errors.len() - fifth..]));
+    both.context("no sample was scored")
 }
 
 /// The frame in which the drifting estimate is furthest off, with labels and estimates on it.
@@ -219,8 +211,14 @@ fn draw(flight: &Synthetic, document: &ResultDocument) -> anyhow::Result<Vec<u8>
 fn kept(out: &Path) -> anyhow::Result<String> {
     let out = out.display();
     let mut text = String::new();
-    writeln!(text, "\n{out} now holds the flight in the EuRoC layout, result.json and overlay.png")?;
-    writeln!(text, "(blue ring: the label; white: exact; green: drift; yellow: clock-offset). Go on with")?;
+    writeln!(
+        text,
+        "\n{out} now holds the flight in the EuRoC layout, result.json, overlay.png (blue ring: the label;"
+    )?;
+    writeln!(
+        text,
+        "white: exact; green: drift; yellow: clock-offset) and report.html, to be opened in a browser. Go on with"
+    )?;
     writeln!(text, "  vice info {out}")?;
     writeln!(
         text,

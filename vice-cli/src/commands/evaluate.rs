@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use vice_core::metrics::align::Alignment;
 
+use super::report::with_progress;
 use crate::inputs::{EvaluationArgs, Outputs, Scoring, to_json};
 use crate::report;
+use crate::report::html::{IMAGE_BUDGET_BYTES, Run, render};
 use crate::terminal::{self, Outcome, Verbosity};
 
 /// Arguments of `vice evaluate`.
@@ -56,6 +58,9 @@ struct OutputArgs {
     /// The table as LaTeX.
     #[arg(long, value_name = "FILE")]
     latex: Option<PathBuf>,
+    /// A page with the table, plots and images.
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
 }
 
 fn percent(text: &str) -> Result<f64, String> {
@@ -66,14 +71,28 @@ fn percent(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
-    let outputs =
-        Outputs::new(&[&args.output.json, &args.output.csv, &args.output.latex], &args.evaluation.files())?;
+    let outputs = Outputs::new(
+        &[&args.output.json, &args.output.csv, &args.output.latex, &args.output.report],
+        &args.evaluation.files(),
+    )?;
     let scoring = Scoring {
         subsets: args.scoring.subsets.iter().map(|n| usize::from(*n)).collect(),
         align: args.scoring.align,
-        keep_samples: args.output.samples == "all",
+        // The page plots samples even where the document is to list none.
+        keep_samples: args.output.samples == "all" || args.output.report.is_some(),
     };
-    let (document, _) = args.evaluation.evaluate(&scoring, verbosity)?;
+    let (mut document, dataset) = args.evaluation.evaluate(&scoring, verbosity)?;
+    let page = match &args.output.report {
+        Some(path) => {
+            let shots = with_progress(&document, dataset.as_ref(), IMAGE_BUDGET_BYTES, verbosity);
+            let run = Run::new(document.clone(), shots);
+            Some((path, render(&[run])?))
+        }
+        None => None,
+    };
+    if args.output.samples == "none" {
+        document.drop_samples();
+    }
     // All texts are made before the first is written, so that a failure leaves nothing half done.
     let json = args
         .output
@@ -89,7 +108,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         .as_ref()
         .map(|path| report::latex::render(&document).map(|t| (path, t)))
         .transpose()?;
-    let texts: Vec<(&PathBuf, String)> = [json, csv, latex].into_iter().flatten().collect();
+    let texts: Vec<(&PathBuf, String)> = [json, csv, latex, page].into_iter().flatten().collect();
     if !outputs.write(&texts)? {
         terminal::print(&report::table::render(&document))?;
     }

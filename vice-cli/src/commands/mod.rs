@@ -11,5 +11,6 @@ pub(crate) mod floor;
 pub(crate) mod formats;
 pub(crate) mod info;
 pub(crate) mod labels;
+pub(crate) mod report;
 pub(crate) mod synth;
 pub(crate) mod trajectory;

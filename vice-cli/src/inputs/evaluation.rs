@@ -139,6 +139,9 @@ impl EvaluationArgs {
         let mut other: BTreeMap<String, String> =
             self.dataset.settings.iter().map(|(key, value)| (format!("set {key}"), value.clone())).collect();
         other.insert("estimate".to_string(), split_list(&self.streams.estimate).join(","));
+        if !self.labels.points.is_empty() {
+            other.insert("points".to_string(), split_list(&self.labels.points).join(","));
+        }
         if let Some(reference) = &self.streams.reference {
             other.insert("reference".to_string(), reference.clone());
         }

@@ -1,0 +1,51 @@
+use super::*;
+use crate::report::testing::{HOSTILE, document, hostile_document, part, sample};
+
+fn page(document: ResultDocument) -> String {
+    render(&[Run::new(document, Shots::missing(HOSTILE))]).unwrap()
+}
+
+#[test]
+fn no_text_from_data_becomes_markup() {
+    let mut run = Run::new(hostile_document(), Shots::missing(HOSTILE));
+    run.more.push(Section { title: HOSTILE.to_string(), lines: vec![HOSTILE.to_string()] });
+    let text = render(&[run]).unwrap();
+    // Ours: the data, and the slider.
+    assert_eq!(text.matches("<script").count(), 2);
+    assert_eq!(text.matches("</script").count(), 2);
+    assert!(text.contains("&lt;script&gt;alert(1)"));
+    let no_control = |c: char| c == '\n' || !c.is_control() && c != '\u{2028}';
+    assert!(text.chars().all(no_control));
+    let json = text.split("class=\"result\">").nth(1).unwrap().split("</script>").next().unwrap();
+    let back: ResultDocument = serde_json::from_str(json).unwrap();
+    assert_eq!(back.dataset.name, HOSTILE);
+}
+
+#[test]
+fn what_is_missing_is_said() {
+    let text = page(document(vec![part("e", &[])]));
+    assert!(text.contains("No images to draw on") && text.contains("No label could be scored"));
+    let mut without_samples = part("e", &[sample("a", 1, 2.0)]);
+    without_samples.samples.clear();
+    assert!(page(document(vec![without_samples])).contains("--samples none"));
+    assert!(page(document(vec![])).contains("Nothing was evaluated"));
+}
+
+#[test]
+fn numbers_beyond_reason_are_drawn_without_harm() {
+    let mut bad = sample("a", i64::MAX, f64::MAX);
+    bad.tracked_px.u = -1e300;
+    let text = page(document(vec![part("e", &[sample("a", i64::MIN, 0.0), bad, sample("b", 0, 1e-300)])]));
+    assert!(!text.contains("NaN") && !text.contains("inf"));
+}
+
+#[test]
+fn a_long_run_makes_a_small_page() {
+    let points = ["a", "b", "c", "d"];
+    let samples: Vec<_> = (0..2400)
+        .map(|i| sample(points[i % 4], 50_000_000 * (i as i64 / 4), (i as f64 * 0.7).sin().abs() * 30.0))
+        .collect();
+    let streams = ["one", "two", "three"].map(|name| part(name, &samples));
+    let text = page(document(streams.to_vec()));
+    assert!(text.len() < 900_000, "{} bytes without images", text.len());
+}

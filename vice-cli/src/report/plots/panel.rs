@@ -1,0 +1,119 @@
+//! A rectangle with two axes in a picture, and what is drawn in it.
+
+use super::axis::Axis;
+use super::picture::{Anchor, Picture, Place};
+
+/// More places than this on a line add nothing that can be seen.
+const MAX_PLACES: usize = 1600;
+
+/// The panel: where it lies in the picture, and its axes.
+pub(crate) struct Panel {
+    pub(crate) left: f64,
+    pub(crate) top: f64,
+    pub(crate) width: f64,
+    pub(crate) height: f64,
+    pub(crate) x: Axis,
+    pub(crate) y: Axis,
+}
+
+impl Panel {
+    /// Draws grid and marks; the title of y stands over the panel, that of x below. Without the latter x has no numbers.
+    pub(crate) fn draw_axes(&self, picture: &mut Picture, x_title: Option<&str>, y_title: &str) {
+        let (right, bottom) = (self.left + self.width, self.top + self.height);
+        for (value, label) in self.y.ticks() {
+            let y = self.place_y(value);
+            picture.line("grid", [(self.left, y), (right, y)]);
+            picture.text("", (self.left - 6.0, y + 4.0), Anchor::End, &label);
+        }
+        for (value, label) in self.x.ticks() {
+            let x = self.place_x(value);
+            picture.line("grid", [(x, self.top), (x, bottom)]);
+            if x_title.is_some() {
+                picture.text("", (x, bottom + 15.0), Anchor::Middle, &label);
+            }
+        }
+        picture.line("axis", [(self.left, bottom), (right, bottom)]);
+        picture.text("title", (self.left - 34.0, self.top - 8.0), Anchor::Start, y_title);
+        if let Some(title) = x_title {
+            picture.text("", (right, bottom + 31.0), Anchor::End, title);
+        }
+    }
+
+    pub(crate) fn place_x(&self, x: f64) -> f64 {
+        self.left + self.width * self.x.place(x)
+    }
+
+    pub(crate) fn place_y(&self, y: f64) -> f64 {
+        self.top + self.height * (1.0 - self.y.place(y))
+    }
+
+    pub(crate) fn place(&self, (x, y): (f64, f64)) -> Place {
+        (self.place_x(x), self.place_y(y))
+    }
+
+    /// A line through values that ascend in x, broken where `gap` is exceeded.
+    pub(crate) fn line(&self, picture: &mut Picture, class: &str, values: &[(f64, f64)], gap: f64) {
+        for run in values.chunk_by(|a, b| b.0 - a.0 <= gap) {
+            if let [single] = run {
+                picture.dots(class, [self.place(*single)]);
+            }
+            picture.line(class, extremes(run, MAX_PLACES).into_iter().map(|v| self.place(v)));
+        }
+    }
+
+    /// Dots; where there are too many, every n-th of them. Returns that n.
+    pub(crate) fn dots(
+        &self,
+        picture: &mut Picture,
+        class: &str,
+        values: &[(f64, f64)],
+        most: usize,
+    ) -> usize {
+        let step = values.len().div_ceil(most.max(1)).max(1);
+        picture.dots(class, values.iter().step_by(step).map(|v| self.place(*v)));
+        step
+    }
+}
+
+/// At most so many of the values, the lowest and the highest of each stretch among them.
+pub(crate) fn extremes(values: &[(f64, f64)], most: usize) -> Vec<(f64, f64)> {
+    if values.len() <= most {
+        return values.to_vec();
+    }
+    let stretch = values.len().div_ceil((most / 2).max(1));
+    let mut kept = Vec::with_capacity(most);
+    for run in values.chunks(stretch) {
+        let by = |a: &(usize, &(f64, f64)), b: &(usize, &(f64, f64))| a.1.1.total_cmp(&b.1.1);
+        let low = run.iter().enumerate().min_by(by).map(|v| v.0);
+        let high = run.iter().enumerate().max_by(by).map(|v| v.0);
+        let (Some(low), Some(high)) = (low, high) else { continue };
+        kept.push(run[low.min(high)]);
+        if low != high {
+            kept.push(run[low.max(high)]);
+        }
+    }
+    kept
+}
+
+/// Three times the usual distance of neighbours in x, above which a line is broken.
+pub(crate) fn usual_gap(values: &[(f64, f64)]) -> f64 {
+    let mut steps: Vec<f64> = values.windows(2).map(|w| w[1].0 - w[0].0).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).map_or(f64::INFINITY, |median| 3.0 * median)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thinned_line_keeps_its_peaks() {
+        let values: Vec<(f64, f64)> =
+            (0..10_000).map(|i| (f64::from(i), if i == 4321 { 9.0 } else { 0.0 })).collect();
+        let kept = extremes(&values, 100);
+        assert!(kept.len() <= 100 && kept.contains(&(4321.0, 9.0)));
+        assert!(kept.windows(2).all(|w| w[0].0 < w[1].0));
+        assert_eq!(extremes(&values[..50], 100).len(), 50);
+        assert_eq!(usual_gap(&[(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (9.0, 0.0)]), 3.0);
+    }
+}
