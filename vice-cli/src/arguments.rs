@@ -56,6 +56,10 @@ pub(crate) enum Command {
     Convert(commands::convert::Args),
     /// Show result documents as a page with plots and images.
     Report(commands::report::Args),
+    /// Draw labels and carried points on the images: a film, or a folder of frames.
+    Overlay(Box<commands::overlay::Args>),
+    /// Hold results side by side, label by label.
+    Compare(commands::compare::Args),
     /// Print completions for a shell.
     Completions(commands::completions::Args),
 }

@@ -35,6 +35,8 @@ fn main() -> ExitCode {
         Command::Labels(args) => commands::labels::run(args, verbosity),
         Command::Convert(args) => commands::convert::run(args),
         Command::Report(args) => commands::report::run(args, verbosity),
+        Command::Overlay(args) => commands::overlay::run(args, verbosity),
+        Command::Compare(args) => commands::compare::run(args),
         Command::Completions(args) => commands::completions::run(args),
     };
     match outcome {

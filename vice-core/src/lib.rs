@@ -19,6 +19,7 @@ pub mod imu;
 pub mod label;
 pub mod lanes;
 pub mod metrics;
+mod random;
 pub mod registry;
 pub mod result;
 pub mod time;

@@ -209,20 +209,20 @@ pub struct TrajectoryPart {
     pub frames: Vec<FrameError>,
 }
 
-/// The error of an estimate at a frame, after alignment.
+/// The error of an estimate at a time, after alignment.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameError {
-    /// The frame.
+    /// When.
     pub timestamp_ns: Stamp,
     /// Distance of the positions, metres.
     pub position_m: f64,
     /// Angle between the orientations, radians.
     pub angle_rad: f64,
-    /// Whether the frame is one of those that the numbers are made of; the others lie between them and fill the plot.
+    /// Whether this is one of the frames that the numbers are made of; the others lie between them and fill the plot.
     pub evaluated: bool,
 }
 
-/// Where a stream went between the first and the last evaluated frame, at frames of the camera.
+/// Where a stream went between the first and the last evaluated frame: at these frames, and at times between them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PathPart {
     /// Name of the pose stream.
@@ -238,7 +238,7 @@ pub struct PathPart {
 /// A pose of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PathPose {
-    /// The frame.
+    /// When.
     pub timestamp_ns: Stamp,
     /// Position in the world, metres.
     pub position_m: [f64; 3],

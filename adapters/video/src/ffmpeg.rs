@@ -15,7 +15,7 @@ const OLDEST_LIBAVCODEC: (u32, u32) = (58, 18);
 /// libavcodec of FFmpeg 5.1, where `-vsync` became `-fps_mode`.
 const FPS_MODE_LIBAVCODEC: (u32, u32) = (59, 37);
 /// How to get it, for every error about a missing one.
-const INSTALL: &str = "install FFmpeg 4.0 or later (`apt install ffmpeg`, `brew install ffmpeg`, `winget install \
+pub(crate) const INSTALL: &str = "install FFmpeg 4.0 or later (`apt install ffmpeg`, `brew install ffmpeg`, `winget install \
                        ffmpeg`, https://ffmpeg.org/download.html) so that `ffmpeg` is on the PATH";
 /// Lines of FFmpeg that an error quotes.
 const QUOTED_LINES: usize = 4;
@@ -59,7 +59,7 @@ impl Ffmpeg {
                 std::io::ErrorKind::NotFound => format!("FFmpeg (`{name}`) is not installed"),
                 _ => format!("FFmpeg (`{name}`) cannot be started"),
             };
-            DataError::new(format!("decoding a film needs FFmpeg: {what}")).hint(INSTALL).because(e)
+            DataError::new(format!("{what}, which films need")).hint(INSTALL).because(e)
         })?;
         let text = String::from_utf8_lossy(&output.stdout);
         let version = libavcodec_version(&text).ok_or_else(|| {
@@ -72,7 +72,7 @@ impl Ffmpeg {
         Ok(*self.libavcodec.get_or_init(|| version))
     }
 
-    fn command(&self) -> Command {
+    pub(crate) fn command(&self) -> Command {
         let mut command = Command::new(&self.program);
         // Settings of the user's shell that would colour its words or write a report file.
         command.env("AV_LOG_FORCE_NOCOLOR", "1").env_remove("AV_LOG_FORCE_COLOR").env_remove("FFREPORT");

@@ -40,6 +40,7 @@
 
 mod dataset;
 mod description;
+mod encode;
 mod ffmpeg;
 pub mod film;
 mod mov;
@@ -48,6 +49,7 @@ mod state;
 
 pub use dataset::Video;
 pub use description::{CameraPart, Description};
+pub use encode::FilmWriter;
 pub use ffmpeg::Ffmpeg;
 pub use stamped::{StampedFilm, check_count, read_stamps};
 pub use state::reference_state;

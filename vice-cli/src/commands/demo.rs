@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Context;
-use vice_core::dataset::{Dataset, GROUND_TRUTH};
+use vice_core::dataset::{Dataset, GROUND_TRUTH, OpenOptions};
 use vice_core::depth::DepthSource;
 use vice_core::evaluate::{Evaluation, Selection, Stream, Window, evaluate};
 use vice_core::metrics::align::Alignment;
@@ -63,7 +63,9 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         let picture = out.join("overlay.png");
         let bytes = draw(&flight, &document)?;
         vice_files::atomic::write(&picture, vice_files::atomic::Overwrite::Replace, |w| w.write_all(&bytes))?;
-        let shots = with_progress(&document, &flight, IMAGE_BUDGET_BYTES, verbosity);
+        // Read back what was rendered: to render it again would take as long as all the rest.
+        let written = crate::formats::registry().open(out, Some("euroc"), &OpenOptions::default())?;
+        let shots = with_progress(&document, written.as_ref(), IMAGE_BUDGET_BYTES, verbosity);
         let run = Run::new(document, shots);
         crate::inputs::write_text(&out.join("report.html"), &render(&[run])?)?;
         text.push_str(&kept(out)?);

@@ -1,6 +1,7 @@
 //! One file a command.
 
 pub(crate) mod annotate;
+pub(crate) mod compare;
 pub(crate) mod completions;
 pub(crate) mod convert;
 pub(crate) mod demo;
@@ -11,6 +12,7 @@ pub(crate) mod floor;
 pub(crate) mod formats;
 pub(crate) mod info;
 pub(crate) mod labels;
+pub(crate) mod overlay;
 pub(crate) mod report;
 pub(crate) mod synth;
 pub(crate) mod trajectory;

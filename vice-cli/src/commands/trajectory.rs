@@ -11,9 +11,12 @@ use vice_core::metrics::rpe::{Delta, DeltaUnit, PairMode, PairsFrom, Rpe, RpeErr
 use vice_core::metrics::trajectory::{Ape, ApeErrors, Statistics, Summary};
 use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
+use vice_files::atomic::Overwrite;
 use vice_files::trajectory::{ReadOptions, TrajectoryFormat, read_spec};
 
 use crate::inputs::{Outputs, span, span_not_negative, to_json};
+use crate::report::evo_zip::{self, About};
+use crate::report::plots::trajectory as plot;
 use crate::report::table;
 use crate::terminal::{self, Outcome, usage};
 
@@ -75,6 +78,12 @@ pub(crate) struct Args {
     /// Result document, vice.trajectory/1; - prints it in place of the table.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Both paths from above and their differences over time.
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// The APE of translations as an archive that evo's evo_res reads.
+    #[arg(long, value_name = "FILE.zip")]
+    evo_zip: Option<PathBuf>,
 }
 
 /// The document `vice.trajectory/1`.
@@ -108,7 +117,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let delta = Delta::new(args.delta, args.delta_unit).map_err(|e| usage(format!("--delta: {e}")))?;
     let read_files =
         [&args.reference, &args.estimate].map(|s| PathBuf::from(s.strip_prefix("rel:").unwrap_or(s)));
-    let outputs = Outputs::new(&[&args.json], &read_files)?;
+    let outputs = Outputs::new(&[&args.json, &args.plot, &args.evo_zip], &read_files)?;
     let (reference, estimate) = read_both(args)?;
     // As evo: what the reference no longer has is not matched either.
     let reference = crop(&reference, args.t_start, args.t_end).with_context(|| args.reference.clone())?;
@@ -153,8 +162,20 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         rpe,
         rpe_problem,
     };
-    let json = args.json.as_ref().map(|path| anyhow::Ok((path, to_json(&document)?)));
-    if !outputs.write(&json.into_iter().collect::<anyhow::Result<Vec<_>>>()?)? {
+    let mut texts = Vec::new();
+    if let Some(path) = &args.json {
+        texts.push((path, to_json(&document)?));
+    }
+    if let Some(path) = &args.plot {
+        texts.push((path, plot::file(&pairs, &args.reference, &args.estimate)));
+    }
+    let (reference, estimated) = (args.reference.as_str(), args.estimate.as_str());
+    let about = About { reference, estimate: estimated, align: args.align.name(), transform: &transform };
+    let archive = args.evo_zip.as_ref().map(|path| anyhow::Ok((path, evo_zip::encode(&pairs, &about)?)));
+    if let Some((path, bytes)) = archive.transpose()? {
+        vice_files::atomic::write(path, Overwrite::Replace, |out| out.write_all(&bytes))?;
+    }
+    if !outputs.write(&texts)? {
         terminal::print(&render(&document, estimate.len()))?;
     }
     Ok(Outcome::Done)

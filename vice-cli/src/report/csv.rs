@@ -3,6 +3,8 @@
 use anyhow::Context;
 use vice_core::result::ResultDocument;
 
+use crate::terminal::printable;
+
 /// Columns: stream, role, depth, points, mean_px, std_px, subsets, pooled_px, scored, skipped, and the trajectory
 /// errors of estimates.
 pub(crate) fn render(document: &ResultDocument) -> anyhow::Result<String> {
@@ -48,11 +50,13 @@ pub(crate) fn render(document: &ResultDocument) -> anyhow::Result<String> {
 }
 
 /// Text from data that a spreadsheet would take for a formula is kept from being one.
-fn cell(text: &str) -> String {
-    if text.starts_with(['=', '+', '-', '@']) && text.parse::<f64>().is_err() {
-        format!("'{text}")
+pub(crate) fn cell(text: &str) -> String {
+    let numeric = text.parse::<f64>().is_ok_and(f64::is_finite);
+    // Tab and carriage return are skipped by some programs before they look for the sign.
+    if text.starts_with(['=', '+', '-', '@', '\t', '\r']) && !numeric {
+        format!("'{}", printable(text))
     } else {
-        text.to_string()
+        printable(text)
     }
 }
 
@@ -61,6 +65,9 @@ mod tests {
     #[test]
     fn a_formula_is_not_run() {
         assert_eq!(super::cell("=1+1"), "'=1+1");
+        for formula in ["+x", "-x", "@sum(a1)", "\t=1", "-inf"] {
+            assert!(super::cell(formula).starts_with('\''), "{formula}");
+        }
         assert_eq!(super::cell("-1.5"), "-1.5");
         assert_eq!(super::cell("imu-euler"), "imu-euler");
     }

@@ -4,6 +4,8 @@ use std::fmt::Write;
 
 use vice_core::result::ResultDocument;
 
+use crate::terminal::printable;
+
 use super::rows::{mean_and_deviation, rows, sizes};
 
 /// A `tabular` to `\input`; it needs the package booktabs.
@@ -48,9 +50,9 @@ pub(crate) fn render(document: &ResultDocument) -> anyhow::Result<String> {
 }
 
 /// Text from data, with what LaTeX would take for a command made plain.
-fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
+    for c in printable(text).chars() {
         match c {
             '\\' => escaped.push_str("\\textbackslash{}"),
             '~' => escaped.push_str("\\textasciitilde{}"),
@@ -59,7 +61,6 @@ fn escape(text: &str) -> String {
                 escaped.push('\\');
                 escaped.push(c);
             }
-            c if c.is_control() => escaped.push(' '),
             c => escaped.push(c),
         }
     }

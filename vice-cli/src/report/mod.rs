@@ -1,7 +1,10 @@
 //! Result documents as text and pictures: the paper's table, CSV, LaTeX, plots, frames, and the page.
 
+pub(crate) mod comparison;
 pub(crate) mod csv;
 pub(crate) mod depth_picture;
+pub(crate) mod evo_zip;
+pub(crate) mod film_frame;
 pub(crate) mod font;
 pub(crate) mod frames;
 pub(crate) mod html;

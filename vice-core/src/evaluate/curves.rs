@@ -9,16 +9,16 @@ use crate::metrics::align::ReferenceFromEstimate;
 use crate::metrics::associate::PosePairs;
 use crate::metrics::trajectory::ApeErrors;
 use crate::result::{FrameError, PathPart, PathPose, Role, TrajectoryPart};
-use crate::time::Stamp;
+use crate::time::{Span, Stamp};
 
-/// About as many frames as a plot can show.
-const MAX_FRAMES: usize = 600;
+/// How many times between the evaluated frames fill a curve.
+const BETWEEN: i64 = 300;
 
 /// The estimates against the reference, where there is one, and the paths of all streams.
 pub(super) fn trajectories(evaluation: &Evaluation<'_>) -> (Vec<TrajectoryPart>, Vec<PathPart>) {
     let stamps: Vec<Stamp> = evaluation.selection.in_window.iter().map(|f| evaluation.frames[*f]).collect();
-    let shown = if evaluation.keep_samples { shown_stamps(evaluation) } else { vec![] };
     let evaluated: BTreeSet<Stamp> = stamps.iter().copied().collect();
+    let shown = if evaluation.keep_samples { shown_stamps(&evaluated) } else { vec![] };
     let reference = evaluation.streams.iter().find(|s| s.role == Role::Reference);
     let (mut parts, mut paths) = (vec![], vec![]);
     for stream in evaluation.streams {
@@ -38,13 +38,12 @@ pub(super) fn trajectories(evaluation: &Evaluation<'_>) -> (Vec<TrajectoryPart>,
     (parts, paths)
 }
 
-/// The evaluated frames, and some of those between them.
-fn shown_stamps(evaluation: &Evaluation<'_>) -> Vec<Stamp> {
-    let selected = &evaluation.selection.in_window;
-    let (Some(first), Some(last)) = (selected.first(), selected.last()) else { return vec![] };
-    let step = (last - first).div_ceil(MAX_FRAMES).max(1);
-    let frames: BTreeSet<usize> = (*first..=*last).step_by(step).chain(selected.iter().copied()).collect();
-    frames.into_iter().map(|f| evaluation.frames[f]).collect()
+/// The evaluated frames, and times at even distances between the first and the last.
+fn shown_stamps(evaluated: &BTreeSet<Stamp>) -> Vec<Stamp> {
+    let (Some(first), Some(last)) = (evaluated.first(), evaluated.last()) else { return vec![] };
+    let step_ns = last.since(*first).as_nanos() / BETWEEN;
+    let between = (1..BETWEEN).map(|i| *first + Span::from_nanos(i * step_ns));
+    evaluated.iter().copied().chain(between).collect::<BTreeSet<Stamp>>().into_iter().collect()
 }
 
 fn frame_errors(

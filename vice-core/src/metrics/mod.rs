@@ -2,6 +2,7 @@
 
 pub mod align;
 pub mod associate;
+pub mod paired;
 pub mod pixel;
 pub mod plane;
 pub mod rotation_offset;

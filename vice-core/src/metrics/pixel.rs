@@ -9,6 +9,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::random::SplitMix;
+
 /// Above this many subsets a seeded sample of [`SAMPLED_SUBSETS`] of them is taken.
 pub const MAX_SUBSETS: u64 = 1_000_000;
 /// How many subsets are sampled where there are more than [`MAX_SUBSETS`].
@@ -127,24 +129,6 @@ impl Moments {
 
     fn std(&self) -> f64 {
         (self.squares / self.count as f64).sqrt()
-    }
-}
-
-/// SplitMix64 (Steele, Lea and Flood 2014): small, seeded, the same everywhere.
-struct SplitMix(u64);
-
-impl SplitMix {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// A number below `n`, by the high half of a product.
-    fn below(&mut self, n: u64) -> u64 {
-        ((u128::from(self.next()) * u128::from(n)) >> 64) as u64
     }
 }
 

@@ -45,7 +45,7 @@ pub(crate) fn strip(id: &str, marks: Option<&Marks>, shots: &Shots, zero: Stamp)
                     @let at = format!("{:.2} s", stamp.since(zero).as_secs_f64());
                     figure.pick[printed.contains(&stamp)] data-at=(at) {
                         div.shot {
-                            img alt={ "frame at " (at) } src=(data_uri(shot)) decoding="async";
+                            img alt={ "frame at " (at) } src=(data_uri(shot));
                             @if let Some(frame) = marks.frames.get(stamp) { (PreEscaped(drawn(marks, frame, shot))) }
                         }
                         figcaption { (caption(marks, *stamp, &at)) }

@@ -5,11 +5,11 @@ use vice_core::result::{PixelPart, TrajectoryPart};
 use super::axis::Axis;
 use super::panel::Panel;
 use super::picture::Picture;
-use super::{LEFT, MAX_DOTS, Plot, RIGHT, WIDTH};
+use super::{LEFT, NONE_PX, Plot, RIGHT, WIDTH};
 use crate::report::numbers::{correlation, mean_by_frame};
 
 /// Fewer frames than this say nothing about a correlation.
-const FEWEST: usize = 5;
+const FEWEST: usize = 8;
 
 /// Mean pixel error of the evaluated frames against their position and angle error.
 pub(crate) fn against_truth(part: &PixelPart, trajectory: &TrajectoryPart, class: &str) -> Option<Plot> {
@@ -27,7 +27,7 @@ pub(crate) fn against_truth(part: &PixelPart, trajectory: &TrajectoryPart, class
     let mut picture = Picture::new(WIDTH, 250.0);
     let between = 30.0;
     let width = (WIDTH - LEFT - RIGHT - between) / 2.0;
-    let y = Axis::from_zero(position.iter().map(|p| p.1), 4);
+    let y = Axis::from_zero(position.iter().map(|p| p.1).chain([NONE_PX]), 4);
     for (index, (title, values)) in
         [("position error (m)", &position), ("angle error (rad)", &angle)].into_iter().enumerate()
     {
@@ -36,11 +36,11 @@ pub(crate) fn against_truth(part: &PixelPart, trajectory: &TrajectoryPart, class
             top: 24.0,
             width,
             height: 180.0,
-            x: Axis::from_zero(values.iter().map(|v| v.0), 3),
+            x: Axis::from_zero(values.iter().map(|v| v.0).chain([0.001]), 3),
             y: y.clone(),
         };
-        panel.draw_axes(&mut picture, Some(title), if index == 0 { "mean pixel error (px)" } else { "" });
-        panel.dots(&mut picture, &format!("faint {class}"), values, MAX_DOTS);
+        panel.draw_axes(&mut picture, Some(title), (index == 0).then_some("mean pixel error (px)"));
+        panel.dots(&mut picture, class, values);
     }
     let says = says(&position, &angle);
     Some(Plot { title: "Pixel error and ground truth", svg: picture.into_svg(&says), says })
@@ -51,6 +51,11 @@ fn says(position: &[(f64, f64)], angle: &[(f64, f64)]) -> String {
     if n < FEWEST {
         return format!(
             "Too few frames ({n}) to say whether the pixel error follows the error against the reference."
+        );
+    }
+    if position.iter().all(|p| p.1 < NONE_PX) {
+        return format!(
+            "There is no pixel error above {NONE_PX} px in {n} frames that could follow anything."
         );
     }
     let follows = |pairs: &[(f64, f64)], what: &str| match correlation(pairs) {

@@ -41,11 +41,11 @@ pub(crate) fn from_above(document: &ResultDocument) -> Option<Plot> {
         return None;
     }
     let says = says(document, common);
-    Some(Plot { title: "Path from above", svg: draw(&tracks).into_svg(&says), says })
+    Some(Plot { title: "Path from above", svg: draw(&tracks, 0.0).0.into_svg(&says), says })
 }
 
-/// Tracks at the same scale in both directions, with their names.
-pub(crate) fn draw(tracks: &[Track]) -> Picture {
+/// Tracks at the same scale in both directions, with their names, and `below` more space under them.
+pub(crate) fn draw(tracks: &[Track], below: f64) -> (Picture, f64) {
     let all = || tracks.iter().flat_map(|t| t.places_m.iter().copied());
     let (mut x, mut y) = (Axis::covering(all().map(|p| p.0), 5), Axis::covering(all().map(|p| p.1), 5));
     let width = WIDTH - LEFT - RIGHT;
@@ -59,8 +59,9 @@ pub(crate) fn draw(tracks: &[Track]) -> Picture {
     }
     let legend = 18.0 * tracks.len().div_ceil(3) as f64;
     let panel = Panel { left: LEFT, top: 24.0 + legend, width, height, x, y };
-    let mut picture = Picture::new(WIDTH, panel.top + height + 42.0);
-    panel.draw_axes(&mut picture, Some("x (m)"), "y (m)");
+    let bottom = panel.top + height + 42.0;
+    let mut picture = Picture::new(WIDTH, bottom + below);
+    panel.draw_axes(&mut picture, Some("x (m)"), Some("y (m)"));
     for (place, track) in tracks.iter().enumerate() {
         let (column, row) = (place % 3, place / 3);
         let (left, y) = (12.0 + column as f64 * (WIDTH / 3.0), 12.0 + 18.0 * row as f64);
@@ -76,7 +77,7 @@ pub(crate) fn draw(tracks: &[Track]) -> Picture {
             picture.dots(&format!("big {}", track.class), [panel.place(*first)]);
         }
     }
-    picture
+    (picture, bottom)
 }
 
 /// A path is no function of x: every n-th place, and the last.

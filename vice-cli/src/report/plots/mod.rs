@@ -10,6 +10,7 @@ pub(crate) mod over_time;
 pub(crate) mod panel;
 pub(crate) mod picture;
 pub(crate) mod spread;
+pub(crate) mod trajectory;
 pub(crate) mod vectors;
 
 /// A plot for a page.
@@ -28,6 +29,9 @@ pub(crate) const LEFT: f64 = 46.0;
 pub(crate) const RIGHT: f64 = 14.0;
 /// Dots in a plot.
 pub(crate) const MAX_DOTS: usize = 2500;
+
+/// Errors below this are none: no label is that good.
+pub(crate) const NONE_PX: f64 = 0.01;
 
 /// The colour class of an estimate by its place among them.
 pub(crate) fn estimate_class(index: usize) -> &'static str {

@@ -8,7 +8,7 @@ use vice_core::time::Stamp;
 use super::axis::Axis;
 use super::panel::{Panel, usual_gap};
 use super::picture::Picture;
-use super::{LEFT, MAX_DOTS, Plot, RIGHT, WIDTH};
+use super::{LEFT, NONE_PX, Plot, RIGHT, WIDTH};
 use crate::report::numbers::{first_and_last, mean_by_frame, px, worst};
 use crate::terminal::printable;
 
@@ -50,13 +50,17 @@ pub(crate) fn over_time(
     };
     let x_title = |index: i32| (index + 1 == panels).then_some("seconds");
 
-    let pixels = panel(0, Axis::from_zero(samples.iter().map(|s| s.1), 4));
-    pixels.draw_axes(&mut picture, x_title(0), "pixel error (px): each label, and the mean of the points");
+    let pixels = panel(0, Axis::from_zero(samples.iter().map(|s| s.1).chain([NONE_PX]), 4));
+    pixels.draw_axes(
+        &mut picture,
+        x_title(0),
+        Some("pixel error (px): each label, and the mean of the points"),
+    );
     mark(&mut picture, &pixels, &keyframes);
-    pixels.dots(&mut picture, &format!("faint {class}"), &samples, MAX_DOTS);
+    pixels.dots(&mut picture, class, &samples);
     let gap = usual_gap(&means);
     pixels.line(&mut picture, class, &means, gap);
-    pixels.dots(&mut picture, "big ink", &keyframes.iter().map(|t| (*t, 0.0)).collect::<Vec<_>>(), MAX_DOTS);
+    picture.dots("big ink", keyframes.iter().map(|t| pixels.place((*t, 0.0))));
     if panels == 3 {
         let errors = |f: fn(&vice_core::result::FrameError) -> f64| -> Vec<(f64, f64)> {
             frames.iter().map(|e| (seconds(e.timestamp_ns), f(e))).collect()
@@ -66,8 +70,8 @@ pub(crate) fn over_time(
             ("angle error (rad)", errors(|e| e.angle_rad)),
         ];
         for (index, (title, values)) in (1_u8..).zip(curves) {
-            let panel = panel(index, Axis::from_zero(values.iter().map(|v| v.1), 4));
-            panel.draw_axes(&mut picture, x_title(i32::from(index)), title);
+            let panel = panel(index, Axis::from_zero(values.iter().map(|v| v.1).chain([0.001]), 4));
+            panel.draw_axes(&mut picture, x_title(i32::from(index)), Some(title));
             mark(&mut picture, &panel, &keyframes);
             panel.line(&mut picture, class, &values, usual_gap(&values));
         }
@@ -101,7 +105,9 @@ fn says(part: &PixelPart, zero: Stamp, keyframes: usize) -> String {
     }
     text.push_str(". ");
     if let Some((early, late)) = first_and_last(part) {
-        let course = if late > 1.5 * early {
+        let course = if early.max(late) < NONE_PX {
+            "It stays"
+        } else if late > 1.5 * early {
             "It grows with the time since the key frame"
         } else if early > 1.5 * late {
             "It shrinks with the time since the key frame"

@@ -1,5 +1,6 @@
 //! A rectangle with two axes in a picture, and what is drawn in it.
 
+use super::MAX_DOTS;
 use super::axis::Axis;
 use super::picture::{Anchor, Picture, Place};
 
@@ -17,13 +18,15 @@ pub(crate) struct Panel {
 }
 
 impl Panel {
-    /// Draws grid and marks; the title of y stands over the panel, that of x below. Without the latter x has no numbers.
-    pub(crate) fn draw_axes(&self, picture: &mut Picture, x_title: Option<&str>, y_title: &str) {
+    /// Draws grid and marks; the title of y stands over the panel, that of x below. An axis without a title has no numbers.
+    pub(crate) fn draw_axes(&self, picture: &mut Picture, x_title: Option<&str>, y_title: Option<&str>) {
         let (right, bottom) = (self.left + self.width, self.top + self.height);
         for (value, label) in self.y.ticks() {
             let y = self.place_y(value);
             picture.line("grid", [(self.left, y), (right, y)]);
-            picture.text("", (self.left - 6.0, y + 4.0), Anchor::End, &label);
+            if y_title.is_some() {
+                picture.text("", (self.left - 6.0, y + 4.0), Anchor::End, &label);
+            }
         }
         for (value, label) in self.x.ticks() {
             let x = self.place_x(value);
@@ -33,7 +36,9 @@ impl Panel {
             }
         }
         picture.line("axis", [(self.left, bottom), (right, bottom)]);
-        picture.text("title", (self.left - 34.0, self.top - 8.0), Anchor::Start, y_title);
+        if let Some(title) = y_title {
+            picture.text("title", (self.left - 34.0, self.top - 8.0), Anchor::Start, title);
+        }
         if let Some(title) = x_title {
             picture.text("", (right, bottom + 31.0), Anchor::End, title);
         }
@@ -61,18 +66,17 @@ impl Panel {
         }
     }
 
-    /// Dots; where there are too many, every n-th of them. Returns that n.
-    pub(crate) fn dots(
-        &self,
-        picture: &mut Picture,
-        class: &str,
-        values: &[(f64, f64)],
-        most: usize,
-    ) -> usize {
-        let step = values.len().div_ceil(most.max(1)).max(1);
-        picture.dots(class, values.iter().step_by(step).map(|v| self.place(*v)));
-        step
+    /// Dots, smaller and fainter where there are many; where there are too many, every n-th of them.
+    pub(crate) fn dots(&self, picture: &mut Picture, class: &str, values: &[(f64, f64)]) {
+        let step = values.len().div_ceil(MAX_DOTS).max(1);
+        let class = format!("{} {class}", how_many(values.len()));
+        picture.dots(&class, values.iter().step_by(step).map(|v| self.place(*v)));
     }
+}
+
+/// The class of dots by their number.
+pub(crate) const fn how_many(dots: usize) -> &'static str {
+    if dots > 300 { "many" } else { "few" }
 }
 
 /// At most so many of the values, the lowest and the highest of each stretch among them.

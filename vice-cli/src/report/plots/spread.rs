@@ -5,7 +5,7 @@ use vice_core::result::PixelPart;
 use super::axis::Axis;
 use super::panel::Panel;
 use super::picture::{Anchor, Picture};
-use super::{LEFT, Plot, RIGHT, WIDTH};
+use super::{LEFT, NONE_PX, Plot, RIGHT, WIDTH};
 use crate::report::numbers::{errors_by_point, px, quantile, rms, sorted};
 use crate::terminal::printable;
 
@@ -32,7 +32,7 @@ pub(crate) fn per_point(part: &PixelPart, class: &str) -> Option<Plot> {
         top: 24.0,
         width: WIDTH - left - RIGHT - 44.0,
         height: row * shown.len() as f64,
-        x: Axis::from_zero(shown.iter().map(|p| p.1), 4),
+        x: Axis::from_zero(shown.iter().map(|p| p.1).chain([NONE_PX]), 4),
         y: Axis::exactly([0.0, 1.0], 1),
     };
     for (value, label) in panel.x.ticks() {
@@ -54,7 +54,8 @@ pub(crate) fn per_point(part: &PixelPart, class: &str) -> Option<Plot> {
         n => {
             let left_out =
                 if n > MAX_BARS { format!(" The {MAX_BARS} worst of {n} are shown.") } else { String::new() };
-            let alike = if worst.1 <= 1.5 * best.1 { "The points agree" } else { "The points differ" };
+            let alike =
+                if worst.1 <= (1.5 * best.1).max(NONE_PX) { "The points agree" } else { "The points differ" };
             format!(
                 "{alike}: from {} (point {}) to {} (point {}).{left_out}",
                 px(best.1),
@@ -74,7 +75,7 @@ pub(crate) fn histogram(part: &PixelPart, class: &str) -> Option<Plot> {
     let largest = *errors.last()?;
     // A few outliers must not push all others into one column: they are counted in the last.
     let cut = if largest > 3.0 * most && most > 0.0 { 1.5 * most } else { largest };
-    let x = Axis::from_zero([cut], 6);
+    let x = Axis::from_zero([cut.max(NONE_PX)], 6);
     let mut counts = [0_u32; BINS];
     for error in &errors {
         counts[((x.place(*error) * BINS as f64) as usize).min(BINS - 1)] += 1;
@@ -90,7 +91,7 @@ pub(crate) fn histogram(part: &PixelPart, class: &str) -> Option<Plot> {
     let mut picture = Picture::new(WIDTH, 226.0);
     let cut_off = cut < largest;
     let x_title = if cut_off { "error (px); larger ones in the last column" } else { "error (px)" };
-    panel.draw_axes(&mut picture, Some(x_title), "labels");
+    panel.draw_axes(&mut picture, Some(x_title), Some("labels"));
     let width = panel.width / BINS as f64;
     for (place, count) in counts.iter().enumerate().filter(|(_, c)| **c > 0) {
         let top = panel.place_y(f64::from(*count));

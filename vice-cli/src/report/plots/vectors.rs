@@ -3,9 +3,9 @@
 use vice_core::result::PixelPart;
 
 use super::axis::Axis;
-use super::panel::Panel;
+use super::panel::{Panel, how_many};
 use super::picture::Picture;
-use super::{MAX_DOTS, Plot, WIDTH};
+use super::{MAX_DOTS, NONE_PX, Plot, WIDTH};
 use crate::report::numbers::{quantile, sorted};
 
 /// What of the errors is common to all: `error = shift + zoom q + turn J q`, `q` the label from the mean of all labels.
@@ -40,7 +40,7 @@ pub(crate) fn vectors(part: &PixelPart, image_size_px: Option<[u32; 2]>, class: 
         Some([c, r]) if c > 0 && r > 0 => [f64::from(c), f64::from(r)],
         _ => [0, 1].map(|i| vectors.iter().map(|v| v.0[i]).fold(1.0, f64::max)),
     };
-    let factor = magnification(long, columns);
+    let factor = magnification(long.max(NONE_PX), columns);
     let width = WIDTH - 24.0;
     let height = (width * rows / columns).clamp(80.0, 520.0);
     let panel = Panel {
@@ -60,9 +60,15 @@ pub(crate) fn vectors(part: &PixelPart, image_size_px: Option<[u32; 2]>, class: 
     let shown = || vectors.iter().step_by(step);
     let end = |(at, e): &([f64; 2], [f64; 2])| [at[0] + factor * e[0], at[1] + factor * e[1]];
     picture.strokes(&format!("thin {class}"), shown().map(|v| (place(v.0), place(end(v)))));
-    picture.dots("faint label", shown().map(|v| place(v.0)));
-    picture.dots(&format!("faint {class}"), shown().map(|v| place(end(v))));
-    let says = says(&vectors);
+    let many = how_many(vectors.len());
+    picture.dots(&format!("{many} label"), shown().map(|v| place(v.0)));
+    picture.dots(&format!("{many} {class}"), shown().map(|v| place(end(v))));
+    let says = match lengths.last() {
+        Some(longest) if *longest < NONE_PX => {
+            format!("No vector is longer than {NONE_PX} px: the points are carried to where the labels are.")
+        }
+        _ => says(&vectors),
+    };
     Some(Plot { title: "Error vectors over the image", svg: picture.into_svg(&says), says })
 }
 
