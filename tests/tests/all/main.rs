@@ -11,5 +11,8 @@ mod depth_oracle;
 mod euroc_oracle;
 mod evaluate_oracle;
 mod locobot_oracle;
+mod report;
+mod report_compare;
+mod report_overlay;
 mod synthetic;
 mod trajectory_oracle;

@@ -1,14 +1,16 @@
 //! `vice evaluate`: the main job.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use vice_core::dataset::Dataset;
 use vice_core::metrics::align::Alignment;
+use vice_core::result::ResultDocument;
 
 use super::report::with_progress;
 use crate::inputs::{EvaluationArgs, Outputs, Scoring, to_json};
 use crate::report;
 use crate::report::html::{IMAGE_BUDGET_BYTES, Run, render};
-use crate::terminal::{self, Outcome, Verbosity};
+use crate::terminal::{self, Outcome, Verbosity, usage};
 
 /// Arguments of `vice evaluate`.
 #[derive(Debug, clap::Args)]
@@ -61,6 +63,9 @@ struct OutputArgs {
     /// A page with the table, plots and images.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
+    /// A recording for the Rerun viewer; in builds with the feature rerun.
+    #[arg(long, value_name = "FILE.rrd")]
+    rrd: Option<PathBuf>,
 }
 
 fn percent(text: &str) -> Result<f64, String> {
@@ -72,14 +77,17 @@ fn percent(text: &str) -> Result<f64, String> {
 
 pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
     let outputs = Outputs::new(
-        &[&args.output.json, &args.output.csv, &args.output.latex, &args.output.report],
+        &[&args.output.json, &args.output.csv, &args.output.latex, &args.output.report, &args.output.rrd],
         &args.evaluation.files(),
     )?;
+    if args.output.rrd.is_some() && !cfg!(feature = "rerun") {
+        return Err(usage("--rrd: this vice was built without Rerun; build it with `--features rerun`"));
+    }
     let scoring = Scoring {
         subsets: args.scoring.subsets.iter().map(|n| usize::from(*n)).collect(),
         align: args.scoring.align,
         // The page plots samples even where the document is to list none.
-        keep_samples: args.output.samples == "all" || args.output.report.is_some(),
+        keep_samples: args.output.samples == "all" || args.output.report.is_some() || args.output.rrd.is_some(),
     };
     let (mut document, dataset) = args.evaluation.evaluate(&scoring, verbosity)?;
     let page = match &args.output.report {
@@ -90,6 +98,9 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         }
         None => None,
     };
+    if let Some(path) = &args.output.rrd {
+        record(path, &document, dataset.as_ref())?;
+    }
     if args.output.samples == "none" {
         document.drop_samples();
     }
@@ -121,4 +132,15 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         return Ok(Outcome::TooManySkips);
     }
     Ok(Outcome::Done)
+}
+
+#[cfg(feature = "rerun")]
+fn record(path: &Path, document: &ResultDocument, dataset: &dyn Dataset) -> anyhow::Result<()> {
+    report::rerun_log::write(path, document, dataset)
+}
+
+/// Refused before the work already.
+#[cfg(not(feature = "rerun"))]
+fn record(_: &Path, _: &ResultDocument, _: &dyn Dataset) -> anyhow::Result<()> {
+    Ok(())
 }

@@ -14,6 +14,8 @@ pub(crate) mod npy;
 pub(crate) mod numbers;
 pub(crate) mod overlay;
 pub(crate) mod plots;
+#[cfg(feature = "rerun")]
+pub(crate) mod rerun_log;
 pub(crate) mod result_file;
 pub(crate) mod rows;
 pub(crate) mod table;
