@@ -189,7 +189,17 @@ fn streams_and_labels_are_converted() {
 #[test]
 fn each_command_has_help_with_an_example() {
     for command in [
-        "demo", "evaluate", "trajectory", "info", "depth", "synth", "convert", "completions", "report", "overlay", "compare",
+        "demo",
+        "evaluate",
+        "trajectory",
+        "info",
+        "depth",
+        "synth",
+        "convert",
+        "completions",
+        "report",
+        "overlay",
+        "compare",
     ] {
         let help = good(vice(&[command, "--help"]));
         assert!(help.contains("Example"), "{command}: {help}");

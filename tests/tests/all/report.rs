@@ -19,7 +19,16 @@ fn evaluated(folder: &Path) -> Option<(Value, String, String)> {
     let data = shared("data/euroc_v1_01")?;
     let (json, html) = (folder.join("out.json"), folder.join("report.html"));
     let labels = data.join("labels/floor.csv");
-    let args = ["evaluate", text(&data), "--labels", text(&labels), "--estimate", "imu-euler", "--depth", "floor,zmap"];
+    let args = [
+        "evaluate",
+        text(&data),
+        "--labels",
+        text(&labels),
+        "--estimate",
+        "imu-euler",
+        "--depth",
+        "floor,zmap",
+    ];
     let table = good(vice(&[&args[..], &["--json", text(&json), "--report", text(&html)]].concat()));
     let document = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
     Some((document, table, std::fs::read_to_string(&html).unwrap()))
@@ -33,7 +42,11 @@ fn the_page_stands_alone_and_its_numbers_are_the_tables() {
         assert!(!page.contains(forbidden), "{forbidden} is in the page");
     }
     assert!(page.contains("Content-Security-Policy") && page.contains("default-src 'none'"));
-    assert!(page.contains("prefers-color-scheme:dark") && page.contains("@media print") && page.contains("width=device-width"));
+    assert!(
+        page.contains("prefers-color-scheme:dark")
+            && page.contains("@media print")
+            && page.contains("width=device-width")
+    );
     // Each cell `mean±std` of the table on the terminal is a cell of the page, as are the pooled numbers.
     let cells: Vec<&str> = table.split_whitespace().filter(|c| c.contains('±') && c.len() > 3).collect();
     assert!(cells.len() >= 12, "{table}");
@@ -67,7 +80,11 @@ fn results_become_a_page_later_with_or_without_their_images() {
     let Some((mut document, _, page)) = evaluated(folder.path()) else { return };
     let path = |name: &str| folder.path().join(name);
     good(vice(&["report", text(&path("out.json")), "--out", text(&path("later.html"))]));
-    assert_eq!(std::fs::read_to_string(path("later.html")).unwrap(), page, "the same page from the document alone");
+    assert_eq!(
+        std::fs::read_to_string(path("later.html")).unwrap(),
+        page,
+        "the same page from the document alone"
+    );
     // The data set has moved: the page is made without images and says so.
     let data = document["settings"]["dataset"].as_str().unwrap().to_string();
     document["settings"]["dataset"] = "no/such/place".into();
@@ -76,11 +93,28 @@ fn results_become_a_page_later_with_or_without_their_images() {
     assert!(run.stderr.contains("no/such/place") && run.stderr.contains("--dataset"), "{}", run.stderr);
     good(run);
     let moved = std::fs::read_to_string(path("moved.html")).unwrap();
-    assert!(moved.contains("No images to draw on") && moved.contains("no/such/place") && !moved.contains("data:image"));
-    good(vice(&["report", text(&path("moved.json")), "--out", text(&path("found.html")), "--dataset", &data]));
+    assert!(
+        moved.contains("No images to draw on")
+            && moved.contains("no/such/place")
+            && !moved.contains("data:image")
+    );
+    good(vice(&[
+        "report",
+        text(&path("moved.json")),
+        "--out",
+        text(&path("found.html")),
+        "--dataset",
+        &data,
+    ]));
     assert!(std::fs::read_to_string(path("found.html")).unwrap().contains("data:image"));
     // Two runs on one page.
-    good(vice(&["report", text(&path("out.json")), text(&path("moved.json")), "--out", text(&path("both.html"))]));
+    good(vice(&[
+        "report",
+        text(&path("out.json")),
+        text(&path("moved.json")),
+        "--out",
+        text(&path("both.html")),
+    ]));
     let both = std::fs::read_to_string(path("both.html")).unwrap();
     assert!(both.contains("2 runs") && both.contains("href=\"#run1\""));
 }
@@ -121,8 +155,20 @@ fn names_from_data_stay_names() {
         .collect();
     std::fs::write(path("labels.csv"), named.join("\n")).unwrap();
     let run = vice(&[
-        "evaluate", text(&data), "--labels", text(&path("labels.csv")), "--estimate", "imu-euler", "--report",
-        text(&path("r.html")), "--csv", text(&path("r.csv")), "--latex", text(&path("r.tex")), "--json", text(&path("r.json")),
+        "evaluate",
+        text(&data),
+        "--labels",
+        text(&path("labels.csv")),
+        "--estimate",
+        "imu-euler",
+        "--report",
+        text(&path("r.html")),
+        "--csv",
+        text(&path("r.csv")),
+        "--latex",
+        text(&path("r.tex")),
+        "--json",
+        text(&path("r.json")),
     ]);
     assert!(!good(run).contains('\u{1b}'));
     let page = std::fs::read_to_string(path("r.html")).unwrap();

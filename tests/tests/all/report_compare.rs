@@ -17,7 +17,8 @@ fn good(run: Run) -> String {
 fn evaluate(out: &Path, estimate: &str, more: &[&str]) -> Option<()> {
     let data = shared("data/euroc_v1_01")?;
     let labels = data.join("labels/floor.csv");
-    let args = ["evaluate", text(&data), "--labels", text(&labels), "--estimate", estimate, "--json", text(out)];
+    let args =
+        ["evaluate", text(&data), "--labels", text(&labels), "--estimate", estimate, "--json", text(out)];
     good(vice(&[&args[..], more].concat()));
     Some(())
 }
@@ -32,10 +33,23 @@ fn a_change_is_told_from_none_and_ci_can_fail_on_it() {
     }
     evaluate(&path("after.json"), "ground-truth", &["--time-offset", "0.05"]).unwrap();
     let (before, after) = (path("before.json"), path("after.json"));
-    let said = good(vice(&["compare", text(&before), text(&after), "--json", text(&path("c.json")), "--csv", text(&path("c.csv")), "--latex", text(&path("c.tex"))]));
+    let said = good(vice(&[
+        "compare",
+        text(&before),
+        text(&after),
+        "--json",
+        text(&path("c.json")),
+        "--csv",
+        text(&path("c.csv")),
+        "--latex",
+        text(&path("c.tex")),
+    ]));
     assert!(said.contains("B is worse"), "{said}");
     let document: Value = serde_json::from_str(&std::fs::read_to_string(path("c.json")).unwrap()).unwrap();
-    assert_eq!((document["schema"].as_str().unwrap(), document["by"].as_str().unwrap()), ("vice.comparison/1", "runs"));
+    assert_eq!(
+        (document["schema"].as_str().unwrap(), document["by"].as_str().unwrap()),
+        ("vice.comparison/1", "runs")
+    );
     let comparisons = document["comparisons"].as_array().unwrap();
     assert_eq!(comparisons.len(), 2, "the reference and the estimate");
     let estimate = &comparisons[1];
@@ -54,7 +68,11 @@ fn a_change_is_told_from_none_and_ci_can_fail_on_it() {
 
     let failed = vice(&["compare", text(&before), text(&after), "--fail-above", "0.5"]);
     assert_eq!(failed.code, 1);
-    assert!(failed.stderr.contains("--fail-above 0.5") && failed.stdout.contains("B is worse"), "{}", failed.stderr);
+    assert!(
+        failed.stderr.contains("--fail-above 0.5") && failed.stdout.contains("B is worse"),
+        "{}",
+        failed.stderr
+    );
     good(vice(&["compare", text(&after), text(&before), "--fail-above", "0.5"]));
     good(vice(&["compare", text(&before), text(&after), "--fail-above", "1000"]));
 }
@@ -67,7 +85,10 @@ fn streams_and_depths_of_one_result() {
         return;
     }
     let streams = good(vice(&["compare", text(&out)]));
-    assert!(streams.contains("imu-euler with floor") && streams.contains("ground-truth with zmap"), "{streams}");
+    assert!(
+        streams.contains("imu-euler with floor") && streams.contains("ground-truth (reference) with zmap"),
+        "{streams}"
+    );
     let depths = good(vice(&["compare", text(&out), "--by", "depths"]));
     assert!(depths.contains("imu-euler with zmap"), "{depths}");
     let runs = vice(&["compare", text(&out), "--by", "runs"]);
@@ -114,7 +135,11 @@ fn evo_finds_its_numbers_in_the_archive() {
     assert_eq!(doubles("timestamps.npy").len(), 142);
     assert_eq!(std::str::from_utf8(file("estimate.tum")).unwrap().lines().count(), 142);
     let svg = std::fs::read_to_string(&plot).unwrap();
-    assert!(svg.starts_with("<svg xmlns") && svg.contains("position error (m)") && svg.contains("prefers-color-scheme"));
+    assert!(
+        svg.starts_with("<svg xmlns")
+            && svg.contains("position error (m)")
+            && svg.contains("prefers-color-scheme")
+    );
 }
 
 /// Names and contents of a ZIP archive whose files are stored as they are, by its local headers (APPNOTE 4.3.7).
@@ -127,7 +152,10 @@ fn stored(bytes: &[u8]) -> Vec<(String, &[u8])> {
         let size = u32::from_le_bytes(bytes[at + 18..at + 22].try_into().unwrap()) as usize;
         let (name, extra) = (u16_at(at + 26), u16_at(at + 28));
         let from = at + 30 + name + extra;
-        files.push((String::from_utf8(bytes[at + 30..at + 30 + name].to_vec()).unwrap(), &bytes[from..from + size]));
+        files.push((
+            String::from_utf8(bytes[at + 30..at + 30 + name].to_vec()).unwrap(),
+            &bytes[from..from + size],
+        ));
         at = from + size;
     }
     files

@@ -87,7 +87,9 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         subsets: args.scoring.subsets.iter().map(|n| usize::from(*n)).collect(),
         align: args.scoring.align,
         // The page plots samples even where the document is to list none.
-        keep_samples: args.output.samples == "all" || args.output.report.is_some() || args.output.rrd.is_some(),
+        keep_samples: args.output.samples == "all"
+            || args.output.report.is_some()
+            || args.output.rrd.is_some(),
     };
     let (mut document, dataset) = args.evaluation.evaluate(&scoring, verbosity)?;
     let page = match &args.output.report {

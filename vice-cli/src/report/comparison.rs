@@ -29,6 +29,7 @@ pub(crate) enum By {
 pub(crate) struct Side {
     pub(crate) run: String,
     pub(crate) stream: String,
+    pub(crate) role: Role,
     pub(crate) depth: String,
 }
 
@@ -83,7 +84,8 @@ impl Document {
 
 impl Side {
     pub(crate) fn name(&self) -> String {
-        format!("{}: {} with {}", self.run, self.stream, self.depth)
+        let role = if self.role == Role::Reference { " (reference)" } else { "" };
+        format!("{}: {}{role} with {}", self.run, self.stream, self.depth)
     }
 }
 
@@ -94,7 +96,8 @@ struct Entry<'a> {
 
 impl Entry<'_> {
     fn side(&self) -> Side {
-        Side { run: self.run.to_string(), stream: self.part.stream.clone(), depth: self.part.depth.clone() }
+        let PixelPart { stream, role, depth, .. } = self.part;
+        Side { run: self.run.to_string(), stream: stream.clone(), role: *role, depth: depth.clone() }
     }
 }
 

@@ -110,14 +110,15 @@ fn summary(document: &ResultDocument) -> String {
     estimates.sort_by(|a, b| {
         a.pooled_rmse_px.unwrap_or_default().total_cmp(&b.pooled_rmse_px.unwrap_or_default())
     });
-    let list: Vec<String> = estimates.iter().map(|p| said(p)).collect();
-    let mut text = match list.as_slice() {
-        [] => "No estimate could be scored.".to_string(),
-        [one] => format!("The estimate is off by {one} RMSE_2D"),
-        many => format!("The estimates are off by RMSE_2D: {}", many.join(", ")),
+    let list: Vec<String> =
+        estimates.iter().map(|p| format!("{} {}", printable(&p.stream), error(p))).collect();
+    let mut text = match estimates.as_slice() {
+        [] => "No estimate could be scored".to_string(),
+        [one] => format!("{} is off by {} RMSE_2D", printable(&one.stream), error(one)),
+        _ => format!("RMSE_2D of the estimates: {}", list.join(", ")),
     };
     if let Some(reference) = of(Role::Reference).next() {
-        text.push_str(&format!("; the reference itself by {}", said(reference)));
+        text.push_str(&format!("; the reference, {}: {}", printable(&reference.stream), error(reference)));
     }
     text.push_str(&format!(" (all points, depth from {}).", printable(depth)));
     text

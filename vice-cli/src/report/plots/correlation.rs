@@ -36,7 +36,7 @@ pub(crate) fn against_truth(part: &PixelPart, trajectory: &TrajectoryPart, class
             top: 24.0,
             width,
             height: 180.0,
-            x: Axis::from_zero(values.iter().map(|v| v.0).chain([0.001]), 3),
+            x: Axis::from_zero(values.iter().map(|v| v.0).chain([0.001]), 2),
             y: y.clone(),
         };
         panel.draw_axes(&mut picture, Some(title), (index == 0).then_some("mean pixel error (px)"));

@@ -24,9 +24,9 @@ pub(crate) struct Plot {
 /// Width of a plot in its own units: narrow enough that its letters can be read on a phone.
 pub(crate) const WIDTH: f64 = 480.0;
 /// Space for the numbers of the y axis.
-pub(crate) const LEFT: f64 = 46.0;
+pub(crate) const LEFT: f64 = 54.0;
 /// Space on the right.
-pub(crate) const RIGHT: f64 = 14.0;
+pub(crate) const RIGHT: f64 = 20.0;
 /// Dots in a plot.
 pub(crate) const MAX_DOTS: usize = 2500;
 

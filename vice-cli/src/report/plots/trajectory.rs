@@ -11,10 +11,20 @@ use crate::terminal::printable;
 
 const PANEL_HEIGHT: f64 = 110.0;
 
+/// The end of a path, which tells more than its beginning.
+fn ending(name: &str) -> String {
+    let count = name.chars().count();
+    if count <= 20 {
+        name.to_string()
+    } else {
+        std::iter::once('…').chain(name.chars().skip(count - 19)).collect()
+    }
+}
+
 /// An SVG file of aligned pairs.
 pub(crate) fn file(pairs: &PosePairs, reference: &str, estimate: &str) -> String {
     let track = |name: &str, class: &str, poses: &[vice_core::frames::WorldFromBody]| Track {
-        name: printable(name),
+        name: ending(&printable(name)),
         class: class.to_string(),
         places_m: poses.iter().map(|p| (p.translation().x, p.translation().y)).collect(),
     };
