@@ -104,8 +104,7 @@ fn summary(document: &ResultDocument) -> String {
         return "Nothing was evaluated.".to_string();
     };
     let of = |role| document.pixel.iter().filter(scored).filter(move |p| p.role == role && p.depth == depth);
-    let said =
-        |p: &PixelPart| format!("{} {}", printable(&p.stream), p.pooled_rmse_px.map(px).unwrap_or_default());
+    let error = |p: &PixelPart| p.pooled_rmse_px.map(px).unwrap_or_default();
     let mut estimates: Vec<&PixelPart> = of(Role::Estimate).collect();
     estimates.sort_by(|a, b| {
         a.pooled_rmse_px.unwrap_or_default().total_cmp(&b.pooled_rmse_px.unwrap_or_default())
