@@ -1,6 +1,7 @@
 //! Flights in memory with one known flaw each, for the diagnosis: no image is rendered.
 //!
-//! The flight is that of the synthetic adapter, 30 s in an empty room whose depth is known exactly. Labels have
+//! The flight is that of the synthetic adapter, 30 s in an empty room whose depth is known exactly; an estimate that is
+//! not inertial turns about all axes besides, as something carried by hand does. Labels have
 //! 0.5 px of noise and one in fifty is off by 10 px, key frames too. The estimate has the errors of a visual-inertial
 //! odometry: position and yaw wander at random, roll and pitch sway about the truth, all of it jitters. With 4 mm and
 //! 0.05° a root second a minute of flight ends about 3 cm and 0.4° off, as good ones do on EuRoC.
@@ -47,10 +48,10 @@ pub struct Flawed {
     pub truth: Theta,
     camera: Camera,
     body_from_camera: BodyFromCamera,
+    room: Room,
     frames: Arc<[Stamp]>,
     labels: LabelSet,
     estimate: Trajectory,
-    reference: Trajectory,
     inertial: Option<InertialRun>,
 }
 
@@ -101,12 +102,14 @@ impl Flawed {
         .expect("a camera");
         let body_from_camera = body_from_camera();
         let frames: Arc<[Stamp]> = (0..(seconds * FRAME_HZ) as i64).map(|i| stamp(i as f64 / FRAME_HZ)).collect();
-        let labels = labels(&flight, &camera, &body_from_camera, &frames, &mut Rng::new(seed, 72));
-        let reference = trajectory(seconds, |t| flight.at(t).world_from_body);
+        let hand = Hand::new(!inertial, &mut Rng::new(seed, 74));
+        let reference = trajectory(seconds, |t| flight.at(t).world_from_body * hand.at(t));
+        let room = Room { camera, body_from_camera, reference };
+        let labels = labels(&room, &frames, &mut Rng::new(seed, 72));
         let inertial = inertial.then(|| run(&flight, seconds, &truth, &mut Rng::new(seed, 73)));
         let estimate = match &inertial {
             Some(run) => run.integrate(Span::ZERO, Vector3::zeros()).expect("it can be integrated"),
-            None => odometry(&reference, &truth, &mut Rng::new(seed, 73)),
+            None => odometry(&room.reference, &truth, &mut Rng::new(seed, 73)),
         };
         // In use is what the truth makes of it when its errors are added: the correction of the negated errors.
         let wrong = truth.negated();
@@ -114,15 +117,29 @@ impl Flawed {
             truth,
             camera: add_to_camera(&camera, &truth),
             body_from_camera: add_to_extrinsics(&body_from_camera, &wrong),
+            room,
             frames,
             labels,
             estimate,
-            reference,
             inertial,
         }
     }
 
-    /// The diagnosis; `with_reference` says whether the true trajectory places the camera for depth.
+    /// How far a flaw, fitted alone, is from the truth: the length of the difference of the vectors. That of the yaw
+    /// rate of a drift stands apart.
+    pub fn errors(&self, flaw: Flaw, diagnosed: &Diagnosed) -> Vec<f64> {
+        let found = diagnosed.document.flaws.iter().find(|p| p.flaw == flaw);
+        let values = found.map(|p| p.parameters.iter().map(|e| e.value)).into_iter().flatten();
+        let errors: Vec<f64> = values.zip(self.truth.of(flaw)).map(|(value, truth)| value - truth).collect();
+        let length = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>().sqrt();
+        match errors.split_at_checked(3) {
+            Some((velocity, [yaw])) => vec![length(velocity), yaw.abs()],
+            _ => vec![length(&errors)],
+        }
+    }
+
+    /// The diagnosis: with the true trajectory as a reference that places the camera for depth, or without any
+    /// reference but with a depth camera.
     ///
     /// # Errors
     /// [`DiagnoseError`] if there is nothing to fit to.
@@ -139,8 +156,10 @@ impl Flawed {
         };
         let mut streams = vec![stream("estimate", Role::Estimate, &self.estimate)];
         if with_reference {
-            streams.insert(0, stream("reference", Role::Reference, &self.reference));
+            streams.insert(0, stream("reference", Role::Reference, &self.room.reference));
         }
+        let depth_camera = DepthCamera(&self.room);
+        let source: &dyn DepthSource = if with_reference { &self.room } else { &depth_camera };
         let evaluation = Evaluation {
             dataset: self,
             camera_name: CAMERA,
@@ -150,7 +169,7 @@ impl Flawed {
             selection: &selection,
             streams: &streams,
             anchor: 0,
-            depths: &[&Room],
+            depths: &[source],
             floor: None,
             max_gap: Span::from_millis(100),
             subsets: None,
@@ -198,15 +217,28 @@ fn trajectory(seconds: f64, pose: impl Fn(f64) -> vice_core::frames::WorldFromBo
     Trajectory::from_poses(poses.map(|t| (stamp(t), pose(t)))).expect("a trajectory")
 }
 
+/// Turns about the axes of the body on top of a flight.
+struct Hand([(f64, f64, f64); 3]);
+
+impl Hand {
+    /// Amplitude (rad), frequency (rad/s) and phase by axis: up, right and forward.
+    fn new(moves: bool, rng: &mut Rng) -> Self {
+        let size = f64::from(u8::from(moves));
+        Self([(0.25, 1.9), (0.12, 2.3), (0.2, 1.5)].map(|(amplitude, frequency)| {
+            (size * amplitude, frequency, rng.uniform(0.0, std::f64::consts::TAU))
+        }))
+    }
+
+    fn at(&self, t_s: f64) -> Rigid<vice_core::frames::Body, vice_core::frames::Body> {
+        let turn = self.0.map(|(amplitude, frequency, phase)| amplitude * (frequency * t_s + phase).sin());
+        Rigid::from_parts(Vector3::zeros(), UnitQuaternion::from_scaled_axis(Vector3::from(turn)))
+    }
+}
+
 /// Points that are followed from a random pixel until they leave the image or for four seconds.
-fn labels(
-    flight: &Flight,
-    camera: &Camera,
-    body_from_camera: &BodyFromCamera,
-    frames: &[Stamp],
-    rng: &mut Rng,
-) -> LabelSet {
-    let at = |i: usize| flight.at(i as f64 / FRAME_HZ).world_from_body * *body_from_camera;
+fn labels(room: &Room, frames: &[Stamp], rng: &mut Rng) -> LabelSet {
+    let camera = &room.camera;
+    let at = |i: usize| room.world_from_camera(frames[i]).expect("the truth covers the frames");
     let mut rows = Vec::new();
     for point in 0..POINTS {
         let mut frame = point % 4;
@@ -279,7 +311,7 @@ fn run(flight: &Flight, seconds: f64, truth: &Theta, rng: &mut Rng) -> InertialR
     const GYRO_RAD_S: f64 = 1.7e-4;
     const ACCEL_M_S2: f64 = 2.0e-3;
     let mut white = |density: f64| Vector3::from_fn(|_, _| density * IMU_HZ.sqrt() * rng.normal());
-    let samples = (0..((seconds + 0.2) * IMU_HZ) as i64).map(|i| {
+    let samples = (-200..((seconds + 1.0) * IMU_HZ) as i64).map(|i| {
         // A held sample says what happens until the next one: the middle of that time.
         let state = flight.at((i as f64 + 0.5) / IMU_HZ);
         ImuSample {
@@ -304,7 +336,18 @@ fn run(flight: &Flight, seconds: f64, truth: &Theta, rng: &mut Rng) -> InertialR
 }
 
 /// The room as a depth source: a ray from inside a box, exact wherever the camera is thought to be.
-struct Room;
+struct Room {
+    camera: Camera,
+    body_from_camera: BodyFromCamera,
+    reference: Trajectory,
+}
+
+impl Room {
+    /// Where the camera truly is.
+    fn world_from_camera(&self, stamp: Stamp) -> Option<WorldFromCamera> {
+        Some(self.reference.pose_at(stamp, Span::from_millis(100)).ok()? * self.body_from_camera)
+    }
+}
 
 impl DepthSource for Room {
     fn name(&self) -> &str {
@@ -312,13 +355,28 @@ impl DepthSource for Room {
     }
 
     fn depths(&self, keyframe: &Keyframe<'_>, pixels: &[Pixel]) -> DataResult<Vec<Result<DepthSample, DepthMiss>>> {
-        let depth = |px: &Pixel| {
-            let pose = keyframe.world_from_camera.ok_or(DepthMiss::NoAnchor)?;
-            let ray = pose.rotate(&keyframe.camera.unproject(*px).map_err(|_| DepthMiss::OutsideModel)?);
-            cast(&pose, &ray).map(DepthSample::new).ok_or(DepthMiss::NoSurface)
-        };
-        Ok(pixels.iter().map(depth).collect())
+        let pose = keyframe.world_from_camera.ok_or(DepthMiss::NoAnchor);
+        Ok(pixels.iter().map(|px| depth(keyframe.camera, &pose?, *px)).collect())
     }
+}
+
+/// A depth camera in the room: what it measures does not depend on what anyone thinks of the calibration.
+struct DepthCamera<'a>(&'a Room);
+
+impl DepthSource for DepthCamera<'_> {
+    fn name(&self) -> &str {
+        "depth-camera"
+    }
+
+    fn depths(&self, keyframe: &Keyframe<'_>, pixels: &[Pixel]) -> DataResult<Vec<Result<DepthSample, DepthMiss>>> {
+        let pose = self.0.world_from_camera(keyframe.stamp).ok_or(DepthMiss::NoDepth);
+        Ok(pixels.iter().map(|px| depth(&self.0.camera, &pose?, *px)).collect())
+    }
+}
+
+fn depth(camera: &Camera, pose: &WorldFromCamera, px: Pixel) -> Result<DepthSample, DepthMiss> {
+    let ray = pose.rotate(&camera.unproject(px).map_err(|_| DepthMiss::OutsideModel)?);
+    cast(pose, &ray).map(DepthSample::new).ok_or(DepthMiss::NoSurface)
 }
 
 /// How far along a ray in the world the room ends, in lengths of the ray; `None` from outside.

@@ -26,6 +26,7 @@ fn main() -> ExitCode {
         Command::Annotate(args) => commands::annotate::run(args, verbosity),
         Command::Demo(args) => commands::demo::run(args, verbosity),
         Command::Evaluate(args) => commands::evaluate::run(args, verbosity),
+        Command::Diagnose(args) => commands::diagnose::run(args, verbosity),
         Command::Trajectory(args) => commands::trajectory::run(args),
         Command::Info(args) => commands::info::run(args),
         Command::Formats => commands::formats::run(),

@@ -20,7 +20,7 @@ fn main() -> ExitCode {
         Some(flaw) => vec![Some(flaw)],
         None => Flaw::ALL.into_iter().map(Some).chain([None]).collect(),
     };
-    println!("flaw                   right  also  doubt  wrong  none   worst errors of the parameters");
+    println!("flaw                   right  also  doubt  wrong  none   worst errors");
     for flaw in flaws {
         let mut counts = [0_u32; 5];
         let mut worst: Vec<f64> = vec![];
@@ -47,10 +47,7 @@ fn main() -> ExitCode {
                 eprintln!("  seed {seed}: {} ({:.3})", verdict.sentence, verdict.sureness);
             }
             if let Some(flaw) = flaw {
-                let found = diagnosed.document.flaws.iter().find(|p| p.flaw == flaw);
-                let values = found.map(|p| p.parameters.iter().map(|e| e.value)).into_iter().flatten();
-                let errors: Vec<f64> =
-                    values.zip(flawed.truth.of(flaw)).map(|(value, truth)| (value - truth).abs()).collect();
+                let errors = flawed.errors(flaw, &diagnosed);
                 worst.resize(errors.len(), 0.0);
                 worst.iter_mut().zip(errors).for_each(|(w, e)| *w = w.max(e));
             }

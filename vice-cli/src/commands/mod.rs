@@ -7,6 +7,7 @@ pub(crate) mod convert;
 pub(crate) mod demo;
 pub(crate) mod depth;
 pub(crate) mod depth_compare;
+pub(crate) mod diagnose;
 pub(crate) mod evaluate;
 pub(crate) mod floor;
 pub(crate) mod formats;

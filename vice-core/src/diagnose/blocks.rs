@@ -14,14 +14,29 @@ use crate::time::Stamp;
 const FEWEST_KEYFRAMES: usize = 6;
 /// More blocks than these say nothing more.
 const MOST_BLOCKS: usize = 12;
+/// Longer cells are cut: their covariance is a full matrix.
+const LONGEST_CELL: usize = 64;
 
-/// Labels by block of time and by point.
+/// Labels of one segment within one block, in time.
+#[derive(Clone, Debug)]
+pub(super) struct Cell {
+    /// The point.
+    pub(super) point: usize,
+    /// The block.
+    pub(super) block: usize,
+    /// The labels.
+    pub(super) labels: Vec<usize>,
+    /// Seconds since the key frame, one for each label.
+    pub(super) seconds: Vec<f64>,
+}
+
+/// Labels by block of time, by point and by segment.
 #[derive(Clone, Debug)]
 pub(super) struct Blocks {
     /// Labels of each block, ascending.
     pub(super) by_time: Vec<Vec<usize>>,
-    /// Labels of each point and block that has some: point, block, labels.
-    pub(super) cells: Vec<(usize, usize, Vec<usize>)>,
+    /// Labels of each segment, as far as they are in one block.
+    pub(super) cells: Vec<Cell>,
     /// Whether the blocks are groups of key frames.
     pub(super) of_keyframes: bool,
 }
@@ -38,14 +53,29 @@ impl Blocks {
         let block_of = grouped(&if of_keyframes { keyframes } else { count(|l| l.stamp) });
         let blocks = block_of.values().max().map_or(0, |b| b + 1);
         let mut by_time = vec![Vec::new(); blocks];
-        let mut cells: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
+        let mut cells: BTreeMap<(usize, usize, Stamp), Vec<usize>> = BTreeMap::new();
         for (i, label) in labels.iter().enumerate() {
             let block = block_of[if of_keyframes { &label.keyframe } else { &label.stamp }];
             by_time[block].push(i);
-            cells.entry((label.point, block)).or_default().push(i);
+            cells.entry((label.point, block, label.keyframe)).or_default().push(i);
         }
-        let cells = cells.into_iter().map(|((point, block), labels)| (point, block, labels)).collect();
+        let seconds = |label: &usize| labels[*label].stamp.since(labels[*label].keyframe).as_secs_f64();
+        let cells = cells.into_iter().flat_map(|((point, block, _), inside)| {
+            let pieces: Vec<Cell> = inside
+                .chunks(LONGEST_CELL)
+                .map(|piece| Cell { point, block, labels: piece.to_vec(), seconds: piece.iter().map(seconds).collect() })
+                .collect();
+            pieces
+        });
+        let cells = cells.collect();
         Self { by_time, cells, of_keyframes }
+    }
+
+    /// Median time since the key frame, seconds.
+    pub(super) fn typical_seconds(&self) -> f64 {
+        let mut seconds: Vec<f64> = self.cells.iter().flat_map(|c| c.seconds.iter().copied()).collect();
+        seconds.sort_by(f64::total_cmp);
+        seconds.get(seconds.len() / 2).copied().unwrap_or(0.0)
     }
 
     pub(super) fn len(&self) -> usize {
@@ -99,7 +129,7 @@ mod tests {
     #[test]
     fn blocks_follow_key_frames_or_else_frames() {
         let many = Blocks::new(&labels(3, 30, 5));
-        assert!(many.of_keyframes && many.len() == MOST_BLOCKS && many.cells.len() == 36);
+        assert!(many.of_keyframes && many.len() == MOST_BLOCKS && many.cells.len() == 90);
         assert!(many.by_time.iter().all(|b| (30..=45).contains(&b.len())), "{:?}", many.by_time);
         let few = Blocks::new(&labels(4, 2, 3));
         assert!(!few.of_keyframes && few.len() == 6 && few.cells.len() == 24);

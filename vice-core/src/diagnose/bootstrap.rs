@@ -22,8 +22,7 @@ pub(super) struct Resampled {
 
 impl Resampled {
     pub(super) fn new(fit: &Fit, blocks: &Blocks, resamples: usize, seed: u64) -> Self {
-        let points = blocks.cells.iter().map(|c| c.0).max().map_or(0, |p| p + 1);
-        let pieces: Vec<Normal> = blocks.cells.iter().map(|(_, _, labels)| fit.normal(labels)).collect();
+        let points = blocks.cells.iter().map(|c| c.point).max().map_or(0, |p| p + 1);
         let solution = DVector::from_iterator(fit.parameters.len(), fit.parameters.iter().map(|p| fit.theta[*p]));
         let ridge = fit.ridge();
         let mut random = SplitMix(seed);
@@ -36,8 +35,8 @@ impl Resampled {
         for _ in 0..resamples {
             let (point_times, block_times) = (draw(points), draw(blocks.len()));
             let mut sum = Normal::zeros(fit.parameters.len());
-            for ((point, block, _), piece) in blocks.cells.iter().zip(&pieces) {
-                let times = point_times[*point] * block_times[*block];
+            for (cell, piece) in blocks.cells.iter().zip(&fit.pieces) {
+                let times = point_times[cell.point] * block_times[cell.block];
                 if times > 0 {
                     sum.add(piece, f64::from(times));
                 }

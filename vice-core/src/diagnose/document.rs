@@ -33,8 +33,10 @@ pub struct DiagnosisDocument {
     pub labels: LabelsPart,
     /// RMSE_2D of all points together as it is, pixels: `pooled_rmse_px` of an evaluation.
     pub rmse_px: f64,
-    /// Robust standard deviation of one coordinate under the best fit, pixels: the noise of labels and poses.
-    pub noise_px: f64,
+    /// Standard deviation of one coordinate of a label under the best fit, pixels.
+    pub label_noise_px: f64,
+    /// Standard deviation of one coordinate by the wander of the poses, one second after a key frame, pixels.
+    pub wander_px_root_s: f64,
     /// Each flaw fitted alone.
     pub flaws: Vec<FlawPart>,
     /// Pairs of flaws of which one could account for more than half of what the other does.
@@ -83,8 +85,8 @@ pub struct FlawPart {
     pub rmse_px: f64,
     /// Share of the mean squared error that goes with it, percent.
     pub explained_percent: f64,
-    /// The same on labels that the fit has not seen, percent; negative where the fit does harm there.
-    pub explained_unseen_percent: f64,
+    /// How much likelier it makes labels that the fit has not seen, as a natural logarithm; negative where it does harm.
+    pub likelier: f64,
     /// How sure it is that the fit explains unseen labels better than no flaw does, 0 to 1.
     pub sureness: f64,
     /// Number of directions of its parameters that the labels can show.

@@ -14,8 +14,10 @@ mod bootstrap;
 mod document;
 mod flaw;
 mod motion;
+mod noise;
 mod observability;
 mod problem;
+mod sensitivity;
 mod solve;
 mod theta;
 mod unseen;
@@ -27,13 +29,16 @@ pub use document::{
 };
 pub use flaw::{Flaw, PARAMETER_COUNT, PARAMETERS, ParameterInfo};
 pub use motion::InertialRun;
+pub use sensitivity::{Curve, CurvePoint, SENSITIVITY_SCHEMA, SensitivityDocument, sensitivity};
 pub use theta::Theta;
 
 use blocks::Blocks;
 use bootstrap::Resampled;
 use observability::{Observability, overlap};
+use noise::Noise;
 use problem::{Problem, rmse_px};
 use solve::Fit;
+use unseen::Ruler;
 use verdict::{Found, Judge, singles};
 
 use crate::evaluate::{EvaluateError, Evaluation};
@@ -64,9 +69,9 @@ pub enum DiagnoseError {
     /// No flaw is left to look for.
     #[error("no flaw is left to look for: an initial tilt is only fitted to an inertial estimate")]
     NoFlaws,
-    /// A trial value made no camera.
-    #[error("a fit ran away to values that are no camera")]
-    Diverged,
+    /// A trial value cannot be evaluated.
+    #[error("a trial value cannot be evaluated: {0}")]
+    CannotEvaluate(String),
     /// The residuals could not be made.
     #[error(transparent)]
     Evaluate(#[from] EvaluateError),
@@ -122,33 +127,18 @@ pub fn diagnose(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Diagnosed, DiagnoseError> {
     let Diagnosis { evaluation, stream, depth, inertial, options, .. } = *diagnosis;
-    let flaws: Vec<Flaw> = Flaw::ALL
-        .into_iter()
-        .filter(|f| diagnosis.flaws.contains(f) && (*f != Flaw::InitialTilt || inertial.is_some()))
-        .collect();
-    if flaws.is_empty() {
-        return Err(DiagnoseError::NoFlaws);
-    }
+    let flaws = flaws_of(diagnosis)?;
     let problem = Problem::new(evaluation, stream, depth, inertial)?;
     let blocks = Blocks::new(&problem.labels);
-    let labels = LabelsPart {
-        scored: problem.labels.len(),
-        points: problem.point_count(),
-        blocks: blocks.len(),
-        blocks_of: if blocks.of_keyframes { "keyframes" } else { "frames" }.to_string(),
-    };
-    if labels.scored < FEWEST_LABELS || labels.blocks < FEWEST_BLOCKS {
-        let LabelsPart { scored, points, blocks, .. } = labels;
-        return Err(DiagnoseError::TooFewLabels { scored, points, blocks });
-    }
+    let labels = labels_part(&problem, &blocks);
+    check_labels(&labels)?;
     let mut done = 0;
-    let fits = singles(&problem, &flaws, || {
+    let fits = singles(&problem, &blocks, &flaws, || {
         done += 1;
         progress(done, flaws.len());
     })?;
-    let nothing = Fit::of_nothing(&problem);
-    let sigma_px = fits.iter().map(|f| f.sigma_px).fold(nothing.sigma_px, f64::min);
-    let judge = Judge { problem: &problem, blocks: &blocks, options, sigma_px };
+    let noise = least_noise(&fits, &problem, &blocks);
+    let judge = Judge { problem: &problem, blocks: &blocks, options, noise, ruler: Ruler::new(&noise, &blocks) };
     let found = judge.decide(&fits)?;
     let theta = found.named.fit.theta;
     let rmse = rmse_px(&problem.base);
@@ -167,12 +157,46 @@ pub fn diagnose(
         settings: evaluation.settings.clone(),
         labels,
         rmse_px: rmse,
-        noise_px: found.named.fit.sigma_px.min(sigma_px),
+        label_noise_px: noise.label_px,
+        wander_px_root_s: noise.wander_px,
         flaws: fits.iter().flat_map(|fit| fit.flaws.iter().map(|flaw| part(fit, *flaw))).collect(),
         overlaps: overlaps(&fits),
         verdict: verdict_of(&found, &fits, fitted, rmse, time_offset_s),
     };
     Ok(Diagnosed { document, theta })
+}
+
+/// The flaws to look for, in their own order.
+fn flaws_of(diagnosis: &Diagnosis<'_>) -> Result<Vec<Flaw>, DiagnoseError> {
+    let can_be = |f: &Flaw| diagnosis.flaws.contains(f) && (*f != Flaw::InitialTilt || diagnosis.inertial.is_some());
+    let flaws: Vec<Flaw> = Flaw::ALL.into_iter().filter(can_be).collect();
+    if flaws.is_empty() { Err(DiagnoseError::NoFlaws) } else { Ok(flaws) }
+}
+
+/// The noise of the fit that leaves least of it.
+fn least_noise(fits: &[Fit], problem: &Problem<'_>, blocks: &Blocks) -> Noise {
+    let nothing = Fit::of_nothing(problem, blocks).noise;
+    let typical_s = blocks.typical_seconds();
+    fits.iter().map(|fit| fit.noise).fold(nothing, |least, noise| {
+        if noise.after_px(typical_s) < least.after_px(typical_s) { noise } else { least }
+    })
+}
+
+fn labels_part(problem: &Problem<'_>, blocks: &Blocks) -> LabelsPart {
+    LabelsPart {
+        scored: problem.labels.len(),
+        points: problem.point_count(),
+        blocks: blocks.len(),
+        blocks_of: if blocks.of_keyframes { "keyframes" } else { "frames" }.to_string(),
+    }
+}
+
+fn check_labels(labels: &LabelsPart) -> Result<(), DiagnoseError> {
+    let LabelsPart { scored, points, blocks, .. } = *labels;
+    match scored < FEWEST_LABELS || blocks < FEWEST_BLOCKS {
+        true => Err(DiagnoseError::TooFewLabels { scored, points, blocks }),
+        false => Ok(()),
+    }
 }
 
 /// What one flaw of a fit comes to.
@@ -196,9 +220,9 @@ fn flaw_part(judge: &Judge<'_>, fit: &Fit, flaw: Flaw, rmse_before_px: f64) -> F
         estimated(&name, length(&fit.theta.of(flaw)[..vector]), &|values| length(&values[first..first + vector]))
     });
     let alone = if fit.flaws.len() == 1 { None } else { Some(fit.only(flaw)) };
-    let seen = Observability::new(alone.as_ref().unwrap_or(fit), judge.blocks, judge.sigma_px);
+    let seen = Observability::of(alone.as_ref().unwrap_or(fit));
     let candidate = judge.candidate(fit.clone());
-    let nothing = judge.candidate(Fit::of_nothing(judge.problem));
+    let nothing = judge.candidate(Fit::of_nothing(judge.problem, judge.blocks));
     FlawPart {
         flaw,
         text: words::line(flaw, &parameters, size.as_ref()),
@@ -207,9 +231,9 @@ fn flaw_part(judge: &Judge<'_>, fit: &Fit, flaw: Flaw, rmse_before_px: f64) -> F
         size,
         rmse_px: fit.rmse_px(),
         explained_percent: 100.0 * (1.0 - (fit.rmse_px() / rmse_before_px.max(f64::MIN_POSITIVE)).powi(2)),
-        explained_unseen_percent: 100.0 * candidate.unseen.explains_of(&nothing.unseen),
+        likelier: nothing.unseen.total() - candidate.unseen.total(),
         sureness: judge.sureness(&candidate, &nothing),
-        rank: seen.rank,
+        rank: seen.rank(judge.blocks, &judge.noise),
         weakest_px: seen.weakest_px,
         strongest_px: seen.strongest_px,
     }

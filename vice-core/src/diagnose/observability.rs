@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::blocks::Blocks;
 use super::flaw::PARAMETERS;
+use super::noise::Noise;
 use super::solve::Fit;
 
 /// A direction shows if a typical flaw moves the labels by this many deviations of one independent label.
@@ -12,29 +13,33 @@ const SEEN: f64 = 2.0;
 /// What a flaw of typical size does to the labels.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Observability {
-    /// Number of directions of the parameters that show.
-    pub(super) rank: usize,
-    /// RMS effect of a typical flaw in its weakest direction, pixels.
+    /// RMS effect by direction of the parameters, pixels.
+    effects_px: Vec<f64>,
+    /// RMS effect in the direction that shows least, pixels.
     pub(super) weakest_px: f64,
-    /// RMS effect of a typical flaw in its strongest direction, pixels.
+    /// RMS effect in the direction that shows most, pixels.
     pub(super) strongest_px: f64,
 }
 
 impl Observability {
-    /// `sigma_px` is the noise of a label, as the best fit leaves it.
-    pub(super) fn new(fit: &Fit, blocks: &Blocks, sigma_px: f64) -> Self {
+    pub(super) fn of(fit: &Fit) -> Self {
         let labels = fit.residuals.len().max(1) as f64;
-        let typical = typical(fit);
-        let scaled = DMatrix::from_diagonal(&typical) * hessian(fit) * DMatrix::from_diagonal(&typical);
-        let effects: Vec<f64> =
+        let typical = DMatrix::from_diagonal(&typical(fit));
+        let scaled = &typical * hessian(fit) * &typical;
+        let effects_px: Vec<f64> =
             scaled.symmetric_eigenvalues().iter().map(|e| (e.max(0.0) / labels).sqrt()).collect();
-        // Labels of a point within a block err alike: the cells are what is independent.
-        let threshold_px = SEEN * sigma_px / (blocks.cells.len().max(1) as f64).sqrt();
         Self {
-            rank: effects.iter().filter(|e| **e >= threshold_px).count(),
-            weakest_px: effects.iter().copied().fold(f64::INFINITY, f64::min),
-            strongest_px: effects.iter().copied().fold(0.0, f64::max),
+            weakest_px: effects_px.iter().copied().fold(f64::INFINITY, f64::min),
+            strongest_px: effects_px.iter().copied().fold(0.0, f64::max),
+            effects_px,
         }
+    }
+
+    /// Number of directions that show. `noise` is what the best fit leaves.
+    pub(super) fn rank(&self, blocks: &Blocks, noise: &Noise) -> usize {
+        // Labels of a segment err alike: the cells are what is independent.
+        let threshold_px = SEEN * noise.after_px(blocks.typical_seconds()) / (blocks.cells.len().max(1) as f64).sqrt();
+        self.effects_px.iter().filter(|e| **e >= threshold_px).count()
     }
 }
 

@@ -145,10 +145,15 @@ impl<'a> Problem<'a> {
     }
 
     fn tracked(&self, theta: &Theta) -> Result<Vec<(Arc<str>, Stamp, Residual)>, DiagnoseError> {
-        let camera = theta.correct_camera(self.camera).map_err(|_| DiagnoseError::Diverged)?;
+        let camera = theta
+            .correct_camera(self.camera)
+            .map_err(|e| DiagnoseError::CannotEvaluate(e.to_string()))?;
         let cameras: CamerasAtFrames =
             self.cameras.iter().map(|c| c.map(|c| theta.correct_extrinsics(&c))).collect();
-        let poses = self.motion.poses_at(theta, &self.stamps).map_err(EvaluateError::Data)?;
+        let poses = self
+            .motion
+            .poses_at(theta, &self.stamps)
+            .map_err(|e| DiagnoseError::CannotEvaluate(e.to_string()))?;
         let depths = self.depths_at(theta, &camera, &cameras, &poses)?;
         let samples = self.trial.samples(&camera, &cameras, &poses, &depths);
         Ok(samples

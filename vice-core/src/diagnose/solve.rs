@@ -1,18 +1,16 @@
-//! Robust least squares: Levenberg-Marquardt on Huber's loss, whose width follows the median of the residuals.
+//! Robust least squares: Levenberg-Marquardt, reweighted at each step by the noise of what is left ([`Noise`]).
 //!
 //! Well-kept solver crates take no weights that change from step to step, and follow other versions of the matrices.
 
-use nalgebra::{DMatrix, DVector, Matrix2xX};
+use nalgebra::{DMatrix, DVector};
 
 use super::DiagnoseError;
+use super::blocks::{Blocks, Cell};
 use super::flaw::{Flaw, PARAMETERS};
+use super::noise::{Noise, Whitener, coordinate};
 use super::problem::{Problem, Residual, rmse_px};
 use super::theta::Theta;
 
-/// Residuals longer than this many robust deviations count linearly.
-const HUBER: f64 = 3.0;
-/// No label is better than this, pixels: exact residuals must not divide by nothing.
-pub(super) const FLOOR_PX: f64 = 0.01;
 const MAX_STEPS: usize = 40;
 /// A step shorter than this share of the typical size of each parameter is the last.
 const CONVERGED: f64 = 1e-4;
@@ -33,10 +31,10 @@ pub(super) struct Fit {
     pub(super) residuals: Vec<Residual>,
     /// Derivatives there: one column for each parameter.
     pub(super) jacobian: Vec<Vec<Residual>>,
-    /// Robust weights there.
-    pub(super) weights: Vec<f64>,
-    /// Robust standard deviation of one coordinate, pixels.
-    pub(super) sigma_px: f64,
+    /// The noise that is left there.
+    pub(super) noise: Noise,
+    /// The quadratic piece of each cell there.
+    pub(super) pieces: Vec<Normal>,
 }
 
 /// A quadratic piece of the cost: `½ δᵀ H δ + gᵀ δ` of some labels.
@@ -68,57 +66,65 @@ impl Normal {
 
 impl Fit {
     /// No flaw: nothing is free.
-    pub(super) fn of_nothing(problem: &Problem<'_>) -> Self {
+    pub(super) fn of_nothing(problem: &Problem<'_>, blocks: &Blocks) -> Self {
         let residuals = problem.base.clone();
-        let sigma_px = robust_sigma_px(&residuals);
-        let weights = residuals.iter().map(|r| huber_weight(r.norm(), sigma_px)).collect();
         Self {
             flaws: vec![],
             parameters: vec![],
             theta: Theta::zero(),
+            noise: Noise::of(&residuals, blocks),
             residuals,
             jacobian: vec![],
-            weights,
-            sigma_px,
+            pieces: vec![Normal::zeros(0); blocks.cells.len()],
         }
     }
 
     /// Fits some flaws together, from a start.
-    pub(super) fn solve(problem: &Problem<'_>, flaws: &[Flaw], start: &Theta) -> Result<Self, DiagnoseError> {
-        let parameters: Vec<usize> = flaws.iter().copied().flat_map(Flaw::parameters).collect();
+    pub(super) fn solve(
+        problem: &Problem<'_>,
+        blocks: &Blocks,
+        flaws: &[Flaw],
+        start: &Theta,
+    ) -> Result<Self, DiagnoseError> {
         let mut fit = Self {
             flaws: flaws.to_vec(),
+            parameters: flaws.iter().copied().flat_map(Flaw::parameters).collect(),
             theta: first_theta(problem, flaws, start)?,
-            ..Self::of_nothing(problem)
+            ..Self::of_nothing(problem, blocks)
         };
-        fit.parameters = parameters;
         fit.residuals = problem.residuals(&fit.theta)?;
         let mut damping = 1e-4;
         for _ in 0..MAX_STEPS {
-            fit.sigma_px = robust_sigma_px(&fit.residuals);
-            fit.weights = fit.residuals.iter().map(|r| huber_weight(r.norm(), fit.sigma_px)).collect();
             fit.jacobian = problem.jacobian(&fit.theta, &fit.parameters)?;
-            if !fit.step(problem, &mut damping)? {
-                return Ok(fit);
+            if !fit.step(problem, blocks, &mut damping)? {
+                break;
             }
         }
-        // The last step moved the residuals away from their derivatives.
+        // The last step moved the residuals away from their derivatives and pieces.
         fit.jacobian = problem.jacobian(&fit.theta, &fit.parameters)?;
+        let whiteners = fit.reweighted(blocks);
+        fit.pieces = fit.pieces_with(blocks, &whiteners);
         Ok(fit)
     }
 
     /// One accepted step; false where none is left to take.
-    fn step(&mut self, problem: &Problem<'_>, damping: &mut f64) -> Result<bool, DiagnoseError> {
-        let all: Vec<usize> = (0..self.residuals.len()).collect();
+    fn step(
+        &mut self,
+        problem: &Problem<'_>,
+        blocks: &Blocks,
+        damping: &mut f64,
+    ) -> Result<bool, DiagnoseError> {
+        let whiteners = self.reweighted(blocks);
         let ridge = self.ridge();
-        let mut normal = self.normal(&all);
+        let mut normal = Normal::zeros(self.parameters.len());
+        self.pieces_with(blocks, &whiteners).iter().for_each(|piece| normal.add(piece, 1.0));
         for (i, parameter) in self.parameters.iter().enumerate() {
             normal.gradient[i] += ridge[i] * self.theta[*parameter];
         }
         let cost = |residuals: &[Residual], theta: &Theta| {
             let pull: f64 =
                 self.parameters.iter().zip(ridge.iter()).map(|(p, r)| 0.5 * r * theta[*p].powi(2)).sum();
-            residuals.iter().map(|r| huber_loss(r.norm(), self.sigma_px)).sum::<f64>() + pull
+            pull + 0.5 * squares(residuals, blocks, &whiteners)
         };
         let now = cost(&self.residuals, &self.theta);
         while *damping < 1e8 {
@@ -132,52 +138,60 @@ impl Fit {
             }
             let small = |(p, d): (&usize, &f64)| d.abs() < CONVERGED * PARAMETERS[*p].typical;
             let last = self.parameters.iter().zip(delta.iter()).all(small);
-            // Trial values may be no camera at all: those are refused as any bad step.
-            let residuals = match problem.residuals(&theta) {
-                Ok(residuals) => residuals,
-                Err(DiagnoseError::Diverged) => {
-                    *damping *= 10.0;
-                    continue;
+            match problem.residuals(&theta) {
+                Ok(residuals) if cost(&residuals, &theta) < now => {
+                    (self.theta, self.residuals) = (theta, residuals);
+                    *damping = (*damping / 10.0).max(1e-9);
+                    return Ok(!last);
                 }
+                // What cannot be evaluated is a bad step as any other.
+                Ok(_) | Err(DiagnoseError::CannotEvaluate(_)) if !last => *damping *= 10.0,
+                Ok(_) | Err(DiagnoseError::CannotEvaluate(_)) => return Ok(false),
                 Err(error) => return Err(error),
-            };
-            if cost(&residuals, &theta) < now {
-                (self.theta, self.residuals) = (theta, residuals);
-                *damping = (*damping / 10.0).max(1e-9);
-                return Ok(!last);
             }
-            if last {
-                return Ok(false);
-            }
-            *damping *= 10.0;
         }
         Ok(false)
     }
 
+    /// The noise of the residuals as they are, and what whitens each cell.
+    fn reweighted(&mut self, blocks: &Blocks) -> Vec<Option<Whitener>> {
+        self.noise = Noise::of(&self.residuals, blocks);
+        let weights = self.noise.weights(&self.residuals, blocks);
+        blocks.cells.iter().map(|cell| self.noise.whitener(cell, |i| weights[cell.labels[i]])).collect()
+    }
+
+    fn pieces_with(&self, blocks: &Blocks, whiteners: &[Option<Whitener>]) -> Vec<Normal> {
+        blocks
+            .cells
+            .iter()
+            .zip(whiteners)
+            .map(|(cell, whitener)| {
+                let mut piece = Normal::zeros(self.parameters.len());
+                let Some(whitener) = whitener else { return piece };
+                for axis in [0, 1] {
+                    let columns = whitener.apply(self.columns(cell, axis));
+                    let residuals = whitener.apply(DMatrix::from_columns(&[coordinate(&self.residuals, cell, axis)]));
+                    piece.hessian += columns.transpose() * &columns;
+                    piece.gradient += columns.transpose() * residuals.column(0);
+                }
+                piece
+            })
+            .collect()
+    }
+
+    /// One coordinate of the derivatives of a cell's labels: a column for each parameter.
+    pub(super) fn columns(&self, cell: &Cell, axis: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(cell.labels.len(), self.parameters.len(), |row, column| {
+            self.jacobian[column][cell.labels[row]][axis]
+        })
+    }
+
     /// The weak pull to zero that keeps what the labels do not say at zero.
     pub(super) fn ridge(&self) -> DVector<f64> {
-        let variance = self.sigma_px * self.sigma_px;
         DVector::from_iterator(
             self.parameters.len(),
-            self.parameters.iter().map(|p| variance / PARAMETERS[*p].plausible.powi(2)),
+            self.parameters.iter().map(|p| PARAMETERS[*p].plausible.powi(-2)),
         )
-    }
-
-    /// The quadratic piece of some labels.
-    pub(super) fn normal(&self, labels: &[usize]) -> Normal {
-        let mut normal = Normal::zeros(self.parameters.len());
-        for label in labels {
-            let rows = self.rows(*label);
-            let weight = self.weights[*label];
-            normal.hessian += rows.transpose() * &rows * weight;
-            normal.gradient += rows.transpose() * self.residuals[*label] * weight;
-        }
-        normal
-    }
-
-    /// The two rows of a label in the Jacobian.
-    pub(super) fn rows(&self, label: usize) -> Matrix2xX<f64> {
-        Matrix2xX::from_fn(self.parameters.len(), |row, column| self.jacobian[column][label][row])
     }
 
     /// The same solution with only one of its flaws free.
@@ -203,12 +217,16 @@ fn first_theta(problem: &Problem<'_>, flaws: &[Flaw], start: &Theta) -> Result<T
     if !flaws.contains(&Flaw::ClockOffset) || start.of(Flaw::ClockOffset)[0] != 0.0 {
         return Ok(*start);
     }
-    let sigma_px = robust_sigma_px(&problem.base);
     let steps = (FIRST_OFFSETS_S / OFFSET_STEP_S) as i32;
     let mut best = (f64::INFINITY, *start);
     for step in -steps..=steps {
         let theta = start.with(Flaw::ClockOffset, &[f64::from(step) * OFFSET_STEP_S]);
-        let cost: f64 = problem.residuals(&theta)?.iter().map(|r| huber_loss(r.norm(), sigma_px)).sum();
+        let cost = match problem.residuals(&theta) {
+            // Lengths, not squares: outliers must not choose the valley.
+            Ok(residuals) => residuals.iter().map(|r| r.norm()).sum(),
+            Err(DiagnoseError::CannotEvaluate(_)) => f64::INFINITY,
+            Err(error) => return Err(error),
+        };
         if cost < best.0 {
             best = (cost, theta);
         }
@@ -216,21 +234,12 @@ fn first_theta(problem: &Problem<'_>, flaws: &[Flaw], start: &Theta) -> Result<T
     Ok(best.1)
 }
 
-/// Standard deviation of one coordinate from the median length: that of a normal distribution in the plane is
-/// `√(2 ln 2)` deviations long.
-pub(super) fn robust_sigma_px(residuals: &[Residual]) -> f64 {
-    let mut lengths: Vec<f64> = residuals.iter().map(|r| r.norm()).collect();
-    lengths.sort_by(f64::total_cmp);
-    let median = lengths.get(lengths.len() / 2).copied().unwrap_or(0.0);
-    (median / (2.0 * std::f64::consts::LN_2).sqrt()).max(FLOOR_PX)
-}
-
-fn huber_weight(length_px: f64, sigma_px: f64) -> f64 {
-    (HUBER * sigma_px / length_px.max(f64::MIN_POSITIVE)).min(1.0)
-}
-
-/// Half the squared length up to [`HUBER`] deviations, linear beyond.
-pub(super) fn huber_loss(length_px: f64, sigma_px: f64) -> f64 {
-    let knee = HUBER * sigma_px;
-    if length_px <= knee { 0.5 * length_px * length_px } else { knee * (length_px - 0.5 * knee) }
+/// Sum of the squares of whitened residuals.
+fn squares(residuals: &[Residual], blocks: &Blocks, whiteners: &[Option<Whitener>]) -> f64 {
+    let cells = blocks.cells.iter().zip(whiteners);
+    let whitened = cells.filter_map(|(cell, whitener)| {
+        let both = [0, 1].map(|axis| coordinate(residuals, cell, axis));
+        Some(whitener.as_ref()?.apply(DMatrix::from_columns(&both)).norm_squared())
+    });
+    whitened.sum()
 }

@@ -4,47 +4,78 @@
 //! quadratic piece), and its loss there is measured. A flaw that is not there bends itself to the wander of the blocks
 //! it sees and fails on the one it does not; so more parameters are no advantage of their own.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
-use super::blocks::Blocks;
-use super::problem::Residual;
-use super::solve::{Fit, Normal, huber_loss};
+use super::blocks::{Blocks, Cell};
+use super::noise::{Noise, Whitener, coordinate};
+use super::solve::{Fit, Normal};
 use crate::random::SplitMix;
 
-/// Losses and squared errors of each block, by the fit without it.
+/// Errors longer than this many deviations count linearly.
+const HUBER: f64 = 3.0;
+
+/// What unseen errors are measured with: the noise that the best fit leaves.
+pub(super) struct Ruler {
+    whiteners: Vec<Option<Whitener>>,
+}
+
+impl Ruler {
+    pub(super) fn new(noise: &Noise, blocks: &Blocks) -> Self {
+        Self { whiteners: blocks.cells.iter().map(|cell| noise.whitener(cell, |_| 1.0)).collect() }
+    }
+}
+
+/// Loss of one cell, the fit moved by a step.
+fn loss(fit: &Fit, cell: &Cell, step: &DVector<f64>, whitener: Option<&Whitener>) -> f64 {
+    let Some(whitener) = whitener else { return 0.0 };
+    let moved = [0, 1].map(|axis| {
+        let columns = fit.columns(cell, axis);
+        coordinate(&fit.residuals, cell, axis) + columns * step
+    });
+    let both = whitener.apply(DMatrix::from_columns(&moved));
+    both.row_iter().map(|row| huber_loss(row.norm())).sum()
+}
+
+/// Half the squared length up to [`HUBER`], linear beyond.
+fn huber_loss(deviations: f64) -> f64 {
+    if deviations <= HUBER { 0.5 * deviations * deviations } else { HUBER * (deviations - 0.5 * HUBER) }
+}
+
+/// Losses of each block, by the fit without it.
 #[derive(Clone, Debug)]
 pub(super) struct Unseen {
-    /// Huber's loss, px².
+    /// Huber's loss of the independent parts of the errors, in their deviations.
     pub(super) losses: Vec<f64>,
 }
 
 impl Unseen {
-    /// `sigma_px` is the same for all fits that are compared: it says which errors count linearly.
-    pub(super) fn new(fit: &Fit, blocks: &Blocks, sigma_px: f64) -> Self {
-        let pieces: Vec<Normal> = blocks.by_time.iter().map(|labels| fit.normal(labels)).collect();
-        let mut all = Normal::zeros(fit.parameters.len());
-        pieces.iter().for_each(|piece| all.add(piece, 1.0));
+    /// `ruler` is the same for all fits that are compared.
+    pub(super) fn new(fit: &Fit, blocks: &Blocks, ruler: &Ruler) -> Self {
+        let count = fit.parameters.len();
+        let mut by_block = vec![Normal::zeros(count); blocks.len()];
+        let mut all = Normal::zeros(count);
+        for (cell, piece) in blocks.cells.iter().zip(&fit.pieces) {
+            by_block[cell.block].add(piece, 1.0);
+            all.add(piece, 1.0);
+        }
         let ridge = fit.ridge();
-        let losses = blocks.by_time.iter().zip(&pieces).map(|(labels, piece)| {
-            let mut others = all.clone();
-            others.add(piece, -1.0);
-            let step = others.solve(&ridge, 0.0).unwrap_or_else(|| DVector::zeros(fit.parameters.len()));
-            let loss = |label: &usize| {
-                let moved: Residual = fit.residuals[*label] + fit.rows(*label) * &step;
-                huber_loss(moved.norm(), sigma_px)
-            };
-            labels.iter().map(loss).sum()
-        });
-        Self { losses: losses.collect() }
+        let steps: Vec<DVector<f64>> = by_block
+            .iter()
+            .map(|piece| {
+                let mut others = all.clone();
+                others.add(piece, -1.0);
+                others.solve(&ridge, 0.0).unwrap_or_else(|| DVector::zeros(count))
+            })
+            .collect();
+        let mut losses = vec![0.0; blocks.len()];
+        for (cell, whitener) in blocks.cells.iter().zip(&ruler.whiteners) {
+            losses[cell.block] += loss(fit, cell, &steps[cell.block], whitener.as_ref());
+        }
+        Self { losses }
     }
 
     pub(super) fn total(&self) -> f64 {
         self.losses.iter().sum()
-    }
-
-    /// Share of the loss of `other` that this fit takes away, negative where it adds to it.
-    pub(super) fn explains_of(&self, other: &Self) -> f64 {
-        1.0 - self.total() / other.total().max(f64::MIN_POSITIVE)
     }
 
     /// How sure it is that this fit is better than `other`: the share of resampled blocks of time in which its loss is

@@ -2,18 +2,21 @@
 
 use super::blocks::Blocks;
 use super::flaw::Flaw;
+use super::noise::Noise;
 use super::problem::Problem;
 use super::solve::Fit;
 use super::theta::Theta;
-use super::unseen::Unseen;
+use super::unseen::{Ruler, Unseen};
 use super::{DiagnoseError, Options};
 
 /// As sure as this a comparison must be to count.
 pub(super) const SURE: f64 = 0.95;
-/// A first flaw must take away this share of the loss on unseen labels: less is noise that happens to fit.
-const FIRST_SHARE: f64 = 0.2;
-/// A further one must take this share of what is left.
-const NEXT_SHARE: f64 = 0.3;
+/// As sure as this a further flaw must be, which is asked for after a first one was found.
+const SURE_OF_MORE: f64 = 0.99;
+/// A flaw must make unseen labels more likely by this factor, as a logarithm ...
+const LIKELIER: f64 = 8.0;
+/// ... and take away this share of the mean squared error: less may be there, but matters to nobody.
+const SHARE: f64 = 0.1;
 /// More flaws at once than these are not told apart by pixels.
 const MOST_FLAWS: usize = 3;
 
@@ -38,13 +41,15 @@ pub(super) struct Judge<'a> {
     pub(super) problem: &'a Problem<'a>,
     pub(super) blocks: &'a Blocks,
     pub(super) options: Options,
-    /// The noise that says which errors count linearly, pixels.
-    pub(super) sigma_px: f64,
+    /// The noise that the best fit leaves.
+    pub(super) noise: Noise,
+    /// What errors are measured with.
+    pub(super) ruler: Ruler,
 }
 
 impl Judge<'_> {
     pub(super) fn candidate(&self, fit: Fit) -> Candidate {
-        let unseen = Unseen::new(&fit, self.blocks, self.sigma_px);
+        let unseen = Unseen::new(&fit, self.blocks, &self.ruler);
         Candidate { fit, unseen }
     }
 
@@ -54,7 +59,7 @@ impl Judge<'_> {
 
     /// `singles` are the flaws fitted alone.
     pub(super) fn decide(&self, singles: &[Fit]) -> Result<Found, DiagnoseError> {
-        let mut named = self.candidate(Fit::of_nothing(self.problem));
+        let mut named = self.candidate(Fit::of_nothing(self.problem, self.blocks));
         let mut sureness: f64 = 1.0;
         let flaws: Vec<Flaw> = singles.iter().flat_map(|f| f.flaws.iter().copied()).collect();
         while named.fit.flaws.len() < MOST_FLAWS {
@@ -63,11 +68,11 @@ impl Judge<'_> {
                 true => singles.iter().map(|fit| self.candidate(fit.clone())).collect(),
                 false => self.with_one_more(&named.fit, &flaws)?,
             };
-            let share = if first { FIRST_SHARE } else { NEXT_SHARE };
+            let sure_enough = if first { SURE } else { self.attainable(SURE_OF_MORE) };
             let mut better: Vec<(f64, Candidate)> = candidates
                 .into_iter()
                 .map(|c| (self.sureness(&c, &named), c))
-                .filter(|(sure, c)| *sure >= SURE && c.unseen.explains_of(&named.unseen) >= share)
+                .filter(|(sure, c)| *sure >= sure_enough && self.matters(c, &named))
                 .collect();
             better.sort_by(|a, b| a.1.unseen.total().total_cmp(&b.1.unseen.total()));
             let mut better = better.into_iter();
@@ -92,29 +97,42 @@ impl Judge<'_> {
         Ok(Found { named, doubt: vec![], sureness })
     }
 
+    /// Few blocks cannot be very sure of anything.
+    fn attainable(&self, sure: f64) -> f64 {
+        sure.min(1.0 - 0.5_f64.powi(self.blocks.len() as i32))
+    }
+
+    fn matters(&self, candidate: &Candidate, before: &Candidate) -> bool {
+        let left = (candidate.fit.rmse_px() / before.fit.rmse_px().max(f64::MIN_POSITIVE)).powi(2);
+        before.unseen.total() - candidate.unseen.total() >= LIKELIER && left <= 1.0 - SHARE
+    }
+
     fn with_one_more(&self, fit: &Fit, flaws: &[Flaw]) -> Result<Vec<Candidate>, DiagnoseError> {
         let others = flaws.iter().filter(|f| !fit.flaws.contains(f));
         others
             .map(|flaw| {
                 let together: Vec<Flaw> = fit.flaws.iter().copied().chain([*flaw]).collect();
-                Ok(self.candidate(Fit::solve(self.problem, &together, &fit.theta)?))
+                Ok(self.candidate(Fit::solve(self.problem, self.blocks, &together, &fit.theta)?))
             })
             .collect()
     }
 }
 
-/// Fits each flaw alone.
+/// Fits each flaw alone. One that cannot be fitted is left out, and said.
 pub(super) fn singles(
     problem: &Problem<'_>,
+    blocks: &Blocks,
     flaws: &[Flaw],
     mut done: impl FnMut(),
 ) -> Result<Vec<Fit>, DiagnoseError> {
-    flaws
-        .iter()
-        .map(|flaw| {
-            let fit = Fit::solve(problem, &[*flaw], &Theta::zero());
-            done();
-            fit
-        })
-        .collect()
+    let mut fits = Vec::new();
+    for flaw in flaws {
+        match Fit::solve(problem, blocks, &[*flaw], &Theta::zero()) {
+            Ok(fit) => fits.push(fit),
+            Err(DiagnoseError::CannotEvaluate(why)) => tracing::warn!("{flaw} is not looked for: {why}"),
+            Err(error) => return Err(error),
+        }
+        done();
+    }
+    if fits.is_empty() { Err(DiagnoseError::NoFlaws) } else { Ok(fits) }
 }
