@@ -49,6 +49,8 @@ pub(crate) enum Command {
     /// The floor plane.
     #[command(subcommand)]
     Floor(commands::floor::Command),
+    /// Show how RMSE_2D answers to each flaw, and which sizes the labels can show.
+    Sensitivity(Box<commands::sensitivity::Args>),
     /// Write a rendered flight with exact labels and flawed estimates, in the EuRoC layout.
     Synth(commands::synth::Args),
     /// Work with labels files.

@@ -32,6 +32,7 @@ fn main() -> ExitCode {
         Command::Formats => commands::formats::run(),
         Command::Depth(args) => commands::depth::run(args, verbosity),
         Command::Floor(command) => commands::floor::run(command, verbosity),
+        Command::Sensitivity(args) => commands::sensitivity::run(args, verbosity),
         Command::Synth(args) => commands::synth::run(args, verbosity),
         Command::Labels(args) => commands::labels::run(args, verbosity),
         Command::Convert(args) => commands::convert::run(args),

@@ -1,5 +1,6 @@
 //! `cargo run --release -p vice-tests --bin diagnose_seeds -- [SEEDS] [FLAW]`: how often the diagnosis is right, over
-//! flights with one known flaw each, by default 100 of each.
+//! flights with one known flaw each, by default 100 of each: once with a reference that places the camera for depth, and
+//! once without any, with a depth camera.
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stdout, clippy::print_stderr)] // It is all that it is for.
 
@@ -20,13 +21,13 @@ fn main() -> ExitCode {
         Some(flaw) => vec![Some(flaw)],
         None => Flaw::ALL.into_iter().map(Some).chain([None]).collect(),
     };
-    println!("flaw                   right  also  doubt  wrong  none   worst errors");
-    for flaw in flaws {
+    println!("flaw                   depth       right  also  doubt  wrong  none   worst errors");
+    for (flaw, with_reference) in flaws.iter().flat_map(|f| [(*f, true), (*f, false)]) {
         let mut counts = [0_u32; 5];
         let mut worst: Vec<f64> = vec![];
         for seed in 0..seeds {
             let flawed = Flawed::new(flaw, seed);
-            let diagnosed = match flawed.diagnose(seed % 2 == 0) {
+            let diagnosed = match flawed.diagnose(with_reference) {
                 Ok(diagnosed) => diagnosed,
                 Err(error) => {
                     eprintln!("seed {seed}: {error}");
@@ -54,8 +55,9 @@ fn main() -> ExitCode {
         }
         let worst: Vec<String> = worst.iter().map(|e| format!("{e:.5}")).collect();
         let name = flaw.map_or("none", Flaw::name);
+        let depth = if with_reference { "reference" } else { "camera" };
         let [right, also, doubt, wrong, none] = counts;
-        println!("{name:22} {right:5} {also:5} {doubt:6} {wrong:6} {none:5}   {}", worst.join(" "));
+        println!("{name:22} {depth:10} {right:6} {also:5} {doubt:6} {wrong:6} {none:5}   {}", worst.join(" "));
     }
     ExitCode::SUCCESS
 }

@@ -8,6 +8,7 @@ mod blackbird_oracle;
 mod camera_oracle;
 mod commands;
 mod depth_oracle;
+mod diagnose;
 mod euroc_oracle;
 mod evaluate_oracle;
 mod locobot_oracle;

@@ -15,5 +15,6 @@ pub(crate) mod info;
 pub(crate) mod labels;
 pub(crate) mod overlay;
 pub(crate) mod report;
+pub(crate) mod sensitivity;
 pub(crate) mod synth;
 pub(crate) mod trajectory;

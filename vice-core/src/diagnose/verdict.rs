@@ -3,7 +3,7 @@
 use super::blocks::Blocks;
 use super::flaw::Flaw;
 use super::noise::Noise;
-use super::problem::Problem;
+use super::problem::{Problem, rmse_px};
 use super::solve::Fit;
 use super::theta::Theta;
 use super::unseen::{Ruler, Unseen};
@@ -15,8 +15,10 @@ pub(super) const SURE: f64 = 0.95;
 const SURE_OF_MORE: f64 = 0.99;
 /// A flaw must make unseen labels more likely by this factor, as a logarithm ...
 const LIKELIER: f64 = 8.0;
-/// ... and take away this share of the mean squared error: less may be there, but matters to nobody.
+/// ... and take away this share of the mean squared error: less may be there, but matters to nobody ...
 const SHARE: f64 = 0.1;
+/// ... and this share of what there was before any flaw was taken out.
+const SHARE_OF_ALL: f64 = 0.01;
 /// More flaws at once than these are not told apart by pixels.
 const MOST_FLAWS: usize = 3;
 
@@ -103,8 +105,9 @@ impl Judge<'_> {
     }
 
     fn matters(&self, candidate: &Candidate, before: &Candidate) -> bool {
-        let left = (candidate.fit.rmse_px() / before.fit.rmse_px().max(f64::MIN_POSITIVE)).powi(2);
-        before.unseen.total() - candidate.unseen.total() >= LIKELIER && left <= 1.0 - SHARE
+        let [left, there_was] = [candidate, before].map(|c| c.fit.rmse_px().powi(2));
+        let least = (SHARE * there_was).max(SHARE_OF_ALL * rmse_px(&self.problem.base).powi(2));
+        before.unseen.total() - candidate.unseen.total() >= LIKELIER && there_was - left >= least
     }
 
     fn with_one_more(&self, fit: &Fit, flaws: &[Flaw]) -> Result<Vec<Candidate>, DiagnoseError> {
