@@ -12,7 +12,7 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 use vice_core::camera::{Camera, Model, Pixel};
 use vice_core::dataset::{Dataset, Image};
 use vice_core::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
-use vice_core::diagnose::{Diagnosed, Diagnosis, DiagnoseError, Flaw, InertialRun, Options, Theta, diagnose};
+use vice_core::diagnose::{DiagnoseError, Diagnosed, Diagnosis, Flaw, InertialRun, Options, Theta, diagnose};
 use vice_core::error::{DataError, DataResult};
 use vice_core::evaluate::{Evaluation, Selection, Stream, Window};
 use vice_core::frames::{BodyFromCamera, Rigid, WorldFromCamera};
@@ -97,11 +97,13 @@ impl Flawed {
             752,
             480,
             [458.654, 457.296, 367.215, 248.375],
-            Model::from_name("radtan", &[-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]).expect("a model"),
+            Model::from_name("radtan", &[-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05])
+                .expect("a model"),
         )
         .expect("a camera");
         let body_from_camera = body_from_camera();
-        let frames: Arc<[Stamp]> = (0..(seconds * FRAME_HZ) as i64).map(|i| stamp(i as f64 / FRAME_HZ)).collect();
+        let frames: Arc<[Stamp]> =
+            (0..(seconds * FRAME_HZ) as i64).map(|i| stamp(i as f64 / FRAME_HZ)).collect();
         let hand = Hand::new(!inertial, &mut Rng::new(seed, 74));
         let reference = trajectory(seconds, |t| flight.at(t).world_from_body * hand.at(t));
         let room = Room { camera, body_from_camera, reference };
@@ -147,8 +149,8 @@ impl Flawed {
     /// # Panics
     /// If the labels are not at the frames.
     pub fn diagnose(&self, with_reference: bool) -> Result<Diagnosed, DiagnoseError> {
-        let selection =
-            Selection::new(&self.labels, &self.frames, &self.camera, &Window::default()).expect("labels at frames");
+        let selection = Selection::new(&self.labels, &self.frames, &self.camera, &Window::default())
+            .expect("labels at frames");
         let stream = |name: &str, role, trajectory: &Trajectory| Stream {
             name: name.to_string(),
             role,
@@ -245,7 +247,9 @@ fn labels(room: &Room, frames: &[Stamp], rng: &mut Rng) -> LabelSet {
         while frame + 5 < frames.len() {
             let px = Pixel::new(rng.uniform(30.0, 722.0), rng.uniform(30.0, 450.0));
             let ray = at(frame).rotate(&camera.unproject(px).expect("inside the model"));
-            let p = Point3::from(at(frame).translation() + ray * cast(&at(frame), &ray).expect("inside the room"));
+            let p = Point3::from(
+                at(frame).translation() + ray * cast(&at(frame), &ray).expect("inside the room"),
+            );
             let last = (frame + (LONGEST_SEGMENT_S * FRAME_HZ) as usize).min(frames.len());
             let seen = |i: usize| camera.project(&at(i).inverse().transform_point(&p)).ok();
             let mut end = frame;
@@ -354,7 +358,11 @@ impl DepthSource for Room {
         "room"
     }
 
-    fn depths(&self, keyframe: &Keyframe<'_>, pixels: &[Pixel]) -> DataResult<Vec<Result<DepthSample, DepthMiss>>> {
+    fn depths(
+        &self,
+        keyframe: &Keyframe<'_>,
+        pixels: &[Pixel],
+    ) -> DataResult<Vec<Result<DepthSample, DepthMiss>>> {
         let pose = keyframe.world_from_camera.ok_or(DepthMiss::NoAnchor);
         Ok(pixels.iter().map(|px| depth(keyframe.camera, &pose?, *px)).collect())
     }
@@ -368,7 +376,11 @@ impl DepthSource for DepthCamera<'_> {
         "depth-camera"
     }
 
-    fn depths(&self, keyframe: &Keyframe<'_>, pixels: &[Pixel]) -> DataResult<Vec<Result<DepthSample, DepthMiss>>> {
+    fn depths(
+        &self,
+        keyframe: &Keyframe<'_>,
+        pixels: &[Pixel],
+    ) -> DataResult<Vec<Result<DepthSample, DepthMiss>>> {
         let pose = self.0.world_from_camera(keyframe.stamp).ok_or(DepthMiss::NoDepth);
         Ok(pixels.iter().map(|px| depth(&self.0.camera, &pose?, *px)).collect())
     }

@@ -57,7 +57,10 @@ fn main() -> ExitCode {
         let name = flaw.map_or("none", Flaw::name);
         let depth = if with_reference { "reference" } else { "camera" };
         let [right, also, doubt, wrong, none] = counts;
-        println!("{name:22} {depth:10} {right:6} {also:5} {doubt:6} {wrong:6} {none:5}   {}", worst.join(" "));
+        println!(
+            "{name:22} {depth:10} {right:6} {also:5} {doubt:6} {wrong:6} {none:5}   {}",
+            worst.join(" ")
+        );
     }
     ExitCode::SUCCESS
 }

@@ -19,14 +19,23 @@ fn every_seed_names(flaw: Flaw, tolerances: &[f64]) {
         let flawed = Flawed::new(Some(flaw), seed);
         let diagnosed = flawed.diagnose(true).unwrap();
         let verdict = &diagnosed.document.verdict;
-        assert_eq!((verdict.kind, verdict.flaws.first()), (VerdictKind::Named, Some(&flaw)), "{seed}: {}", verdict.sentence);
+        assert_eq!(
+            (verdict.kind, verdict.flaws.first()),
+            (VerdictKind::Named, Some(&flaw)),
+            "{seed}: {}",
+            verdict.sentence
+        );
         let errors = flawed.errors(flaw, &diagnosed);
         for (error, tolerance) in errors.iter().zip(tolerances) {
             assert!(error < tolerance, "seed {seed}: {error} of {tolerance}: {}", verdict.sentence);
         }
         // The same without any reference, the depth from a depth camera.
         let verdict = flawed.diagnose(false).unwrap().document.verdict;
-        assert!(verdict.kind != VerdictKind::Named || verdict.flaws[0] == flaw, "{seed}: {}", verdict.sentence);
+        assert!(
+            verdict.kind != VerdictKind::Named || verdict.flaws[0] == flaw,
+            "{seed}: {}",
+            verdict.sentence
+        );
         assert_ne!(verdict.kind, VerdictKind::NoFlaw, "{seed}: {}", verdict.sentence);
     }
 }
@@ -81,7 +90,8 @@ fn good(run: Run) -> String {
 /// The diagnosis document of the ground truth as the estimate, with more options.
 fn euroc(data: &Path, labels: &str, more: &[&str]) -> Value {
     let labels = data.join(format!("labels/{labels}.csv"));
-    let args = ["diagnose", text(data), "--labels", text(&labels), "--estimate", "ground-truth", "--json", "-"];
+    let args =
+        ["diagnose", text(data), "--labels", text(&labels), "--estimate", "ground-truth", "--json", "-"];
     serde_json::from_str(&good(vice(&[&args[..], more].concat()))).unwrap()
 }
 
@@ -100,7 +110,8 @@ fn rotation(document: &Value) -> Vector3<f64> {
 /// EuRoC's extrinsics turned by two degrees on the camera's side.
 fn turned(data: &Path, folder: &Path) -> (std::path::PathBuf, Vector3<f64>) {
     let turn = Vector3::new(0.6, -0.7, 0.387).normalize() * 2.0_f64.to_radians();
-    let dataset = vice_core::dataset::DatasetFactory::open(&vice_euroc::Euroc, data, &Default::default()).unwrap();
+    let dataset =
+        vice_core::dataset::DatasetFactory::open(&vice_euroc::Euroc, data, &Default::default()).unwrap();
     let right = dataset.body_from_camera("cam0", Default::default()).unwrap();
     let by: Rigid<Camera, Camera> =
         Rigid::from_parts(Vector3::zeros(), nalgebra::UnitQuaternion::from_scaled_axis(turn));
@@ -137,7 +148,8 @@ fn a_shift_put_into_euroc_is_found_and_corrected() {
     let (labels, corrected, out) =
         (data.join("labels/floor.csv"), folder.path().join("corrected.toml"), folder.path().join("out.json"));
     let shared_args = [text(&data), "--labels", text(&labels), "--estimate", "ground-truth"];
-    let diagnose = [&["diagnose"], &shared_args[..], &["--time-offset", "0.05", "--apply", text(&corrected)]].concat();
+    let diagnose =
+        [&["diagnose"], &shared_args[..], &["--time-offset", "0.05", "--apply", text(&corrected)]].concat();
     let said = good(vice(&diagnose));
     assert!(said.contains("clock offset: +") && said.contains("--time-offset "), "{said}");
     let calibrated = ["--calibration", text(&corrected), "--json", text(&out)];
@@ -191,14 +203,28 @@ fn too_few_labels_are_said_on_one_line() {
     let Some(data) = shared("data/euroc_v1_01") else { return };
     let folder = tempfile::tempdir().unwrap();
     let labels = data.join("labels/floor.csv");
-    let args = ["diagnose", text(&data), "--labels", text(&labels), "--estimate", "ground-truth", "--points", "0"];
+    let args =
+        ["diagnose", text(&data), "--labels", text(&labels), "--estimate", "ground-truth", "--points", "0"];
     let run = vice(&args);
     assert_eq!(run.code, 1);
-    assert!(run.stderr.contains("too few labels to fit") && run.stderr.lines().count() == 1, "{}", run.stderr);
+    assert!(
+        run.stderr.contains("too few labels to fit") && run.stderr.lines().count() == 1,
+        "{}",
+        run.stderr
+    );
 
     // Nothing is named, so that there is nothing to apply.
     let out = folder.path().join("c.toml");
-    let run = vice(&["diagnose", text(&data), "--labels", text(&labels), "--estimate", "ground-truth", "--apply", text(&out)]);
+    let run = vice(&[
+        "diagnose",
+        text(&data),
+        "--labels",
+        text(&labels),
+        "--estimate",
+        "ground-truth",
+        "--apply",
+        text(&out),
+    ]);
     assert_eq!(run.code, 1);
     assert!(run.stderr.contains("nothing to apply") && !out.exists(), "{}", run.stderr);
     for (wrong, says) in [(vec!["--flaws", "fov"], "unknown flaw"), (vec!["--apply", "c.json"], ".toml")] {

@@ -121,7 +121,8 @@ fn diagnose_all(
                 bar.set_position(done as u64);
             });
             bar.finish_and_clear();
-            let names = || format!("{} with {}", evaluation.streams[stream].name, evaluation.depths[depth].name());
+            let names =
+                || format!("{} with {}", evaluation.streams[stream].name, evaluation.depths[depth].name());
             all.push(diagnosed.with_context(names)?);
         }
     }
@@ -142,7 +143,9 @@ fn corrected(
     );
     let in_no_calibration = [Flaw::InitialTilt, Flaw::Scale, Flaw::Drift];
     if let Some(flaw) = verdict.flaws.iter().find(|f| in_no_calibration.contains(f)) {
-        anyhow::bail!("--apply: {flaw} is a flaw of the estimate, which no calibration can correct: nothing is written");
+        anyhow::bail!(
+            "--apply: {flaw} is a flaw of the estimate, which no calibration can correct: nothing is written"
+        );
     }
     let mut file = CalibrationFile::new();
     let offset_s = streams.time_offset.as_secs_f64() - theta.of(Flaw::ClockOffset)[0];
@@ -167,9 +170,8 @@ fn corrected_extrinsics(
     if !wrong {
         return Ok(None);
     }
-    let at = |stamp: &vice_core::time::Stamp| {
-        evaluation.dataset.body_from_camera(evaluation.camera_name, *stamp)
-    };
+    let at =
+        |stamp: &vice_core::time::Stamp| evaluation.dataset.body_from_camera(evaluation.camera_name, *stamp);
     let (Some(first), Some(last)) = (evaluation.frames.first(), evaluation.frames.last()) else {
         anyhow::bail!("the camera has no frames");
     };
@@ -203,7 +205,11 @@ fn write_text(text: &mut String, document: &DiagnosisDocument) -> std::fmt::Resu
         labels.blocks,
         labels.blocks_of,
     )?;
-    let mut grid = vec![["flaw, fitted alone [95 %]", "leaves px", "explains", "likelier", "labels show"].map(String::from).to_vec()];
+    let mut grid = vec![
+        ["flaw, fitted alone [95 %]", "leaves px", "explains", "likelier", "labels show"]
+            .map(String::from)
+            .to_vec(),
+    ];
     for flaw in &document.flaws {
         let shown = match flaw.rank {
             0 => "nothing of it".to_string(),

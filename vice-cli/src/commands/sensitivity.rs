@@ -108,7 +108,9 @@ fn render(document: &SensitivityDocument) -> String {
         document.labels.scored,
         document.labels.points
     );
-    let mut grid = vec![["flaw", "axis", "injected", "RMSE_2D px", "seen from", "found from"].map(String::from).to_vec()];
+    let mut grid = vec![
+        ["flaw", "axis", "injected", "RMSE_2D px", "seen from", "found from"].map(String::from).to_vec(),
+    ];
     for curve in &document.curves {
         let (unit, scale) = shown_unit(curve);
         let size = |value: Option<f64>| {

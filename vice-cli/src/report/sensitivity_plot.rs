@@ -15,10 +15,8 @@ const TOP: f64 = 52.0;
 /// A file of its own.
 pub(crate) fn draw(document: &SensitivityDocument) -> String {
     // Curves of a flaw that are shown in the same unit share a panel.
-    let panels: Vec<&[Curve]> = document
-        .curves
-        .chunk_by(|a, b| a.flaw == b.flaw && shown_unit(a).0 == shown_unit(b).0)
-        .collect();
+    let panels: Vec<&[Curve]> =
+        document.curves.chunk_by(|a, b| a.flaw == b.flaw && shown_unit(a).0 == shown_unit(b).0).collect();
     let mut picture = Picture::new(WIDTH, TOP + PANEL_PITCH * panels.len() as f64);
     picture.text("title", (12.0, 18.0), Anchor::Start, "RMSE_2D with each flaw injected");
     for (index, curves) in panels.iter().enumerate() {

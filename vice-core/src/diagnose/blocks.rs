@@ -63,7 +63,12 @@ impl Blocks {
         let cells = cells.into_iter().flat_map(|((point, block, _), inside)| {
             let pieces: Vec<Cell> = inside
                 .chunks(LONGEST_CELL)
-                .map(|piece| Cell { point, block, labels: piece.to_vec(), seconds: piece.iter().map(seconds).collect() })
+                .map(|piece| Cell {
+                    point,
+                    block,
+                    labels: piece.to_vec(),
+                    seconds: piece.iter().map(seconds).collect(),
+                })
                 .collect();
             pieces
         });

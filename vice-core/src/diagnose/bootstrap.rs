@@ -23,7 +23,8 @@ pub(super) struct Resampled {
 impl Resampled {
     pub(super) fn new(fit: &Fit, blocks: &Blocks, resamples: usize, seed: u64) -> Self {
         let points = blocks.cells.iter().map(|c| c.point).max().map_or(0, |p| p + 1);
-        let solution = DVector::from_iterator(fit.parameters.len(), fit.parameters.iter().map(|p| fit.theta[*p]));
+        let solution =
+            DVector::from_iterator(fit.parameters.len(), fit.parameters.iter().map(|p| fit.theta[*p]));
         let ridge = fit.ridge();
         let mut random = SplitMix(seed);
         let mut draw = |n: usize| {

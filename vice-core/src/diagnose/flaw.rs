@@ -133,7 +133,9 @@ impl Flaw {
     pub const fn labels_that_help(self) -> &'static str {
         match self {
             Self::ClockOffset => "frames where the camera's speed or turn rate changes",
-            Self::ExtrinsicRotation => "segments over which the camera turns by tens of degrees, about more than one axis",
+            Self::ExtrinsicRotation => {
+                "segments over which the camera turns by tens of degrees, about more than one axis"
+            }
             Self::ExtrinsicTranslation => "near points, followed while the camera turns",
             Self::FocalLength => "points that move between the middle and the rim of the image",
             Self::PrincipalPoint => "points followed while the camera rolls about its optical axis",

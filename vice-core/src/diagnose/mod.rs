@@ -34,8 +34,8 @@ pub use theta::Theta;
 
 use blocks::Blocks;
 use bootstrap::Resampled;
-use observability::{Observability, overlap};
 use noise::Noise;
+use observability::{Observability, overlap};
 use problem::{Problem, rmse_px};
 use solve::Fit;
 use unseen::Ruler;
@@ -138,7 +138,8 @@ pub fn diagnose(
         progress(done, flaws.len());
     })?;
     let noise = least_noise(&fits, &problem, &blocks);
-    let judge = Judge { problem: &problem, blocks: &blocks, options, noise, ruler: Ruler::new(&noise, &blocks) };
+    let judge =
+        Judge { problem: &problem, blocks: &blocks, options, noise, ruler: Ruler::new(&noise, &blocks) };
     let found = judge.decide(&fits)?;
     let theta = found.named.fit.theta;
     let rmse = rmse_px(&problem.base);
@@ -168,7 +169,8 @@ pub fn diagnose(
 
 /// The flaws to look for, in their own order.
 fn flaws_of(diagnosis: &Diagnosis<'_>) -> Result<Vec<Flaw>, DiagnoseError> {
-    let can_be = |f: &Flaw| diagnosis.flaws.contains(f) && (*f != Flaw::InitialTilt || diagnosis.inertial.is_some());
+    let can_be =
+        |f: &Flaw| diagnosis.flaws.contains(f) && (*f != Flaw::InitialTilt || diagnosis.inertial.is_some());
     let flaws: Vec<Flaw> = Flaw::ALL.into_iter().filter(can_be).collect();
     if flaws.is_empty() { Err(DiagnoseError::NoFlaws) } else { Ok(flaws) }
 }
@@ -217,7 +219,9 @@ fn flaw_part(judge: &Judge<'_>, fit: &Fit, flaw: Flaw, rmse_before_px: f64) -> F
     let length = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>().sqrt();
     let size = (vector > 1 && flaw != Flaw::PrincipalPoint).then(|| {
         let name = PARAMETERS[flaw.parameters().start].name.replacen("_x", "", 1);
-        estimated(&name, length(&fit.theta.of(flaw)[..vector]), &|values| length(&values[first..first + vector]))
+        estimated(&name, length(&fit.theta.of(flaw)[..vector]), &|values| {
+            length(&values[first..first + vector])
+        })
     });
     let alone = if fit.flaws.len() == 1 { None } else { Some(fit.only(flaw)) };
     let seen = Observability::of(alone.as_ref().unwrap_or(fit));
@@ -244,7 +248,8 @@ fn overlaps(fits: &[Fit]) -> Vec<Overlap> {
     for of in fits {
         for with in fits.iter().filter(|with| with.flaws != of.flaws) {
             let share = overlap(of, with);
-            if let ([of], [with], true) = (of.flaws.as_slice(), with.flaws.as_slice(), share > LARGE_OVERLAP) {
+            if let ([of], [with], true) = (of.flaws.as_slice(), with.flaws.as_slice(), share > LARGE_OVERLAP)
+            {
                 overlaps.push(Overlap { of: *of, with: *with, share });
             }
         }
@@ -269,8 +274,9 @@ fn verdict_of(
     let help = |flaws: &[Flaw]| flaws.iter().map(|f| format!("{f}: {}", f.labels_that_help())).collect();
     let (kind, flaws, sentence, labels_that_help) = match (named.flaws.as_slice(), found.doubt.as_slice()) {
         ([], []) => {
-            let sentence =
-                format!("no flaw found above the label noise ({rmse_before_px:.2} px, of which no flaw explains enough)");
+            let sentence = format!(
+                "no flaw found above the label noise ({rmse_before_px:.2} px, of which no flaw explains enough)"
+            );
             (VerdictKind::NoFlaw, vec![], sentence, vec![])
         }
         ([], doubt) => {

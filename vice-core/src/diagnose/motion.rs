@@ -39,10 +39,8 @@ impl InertialRun {
         };
         let pose = self.start.world_from_body;
         let turned = UnitQuaternion::from_scaled_axis(start_turned_rad) * pose.rotation();
-        let start = InertialState {
-            world_from_body: Rigid::from_parts(pose.translation(), turned),
-            ..self.start
-        };
+        let start =
+            InertialState { world_from_body: Rigid::from_parts(pose.translation(), turned), ..self.start };
         integrate_euler(&moved, &start, self.end, self.gravity_m_s2)
             .map_err(|e| DataError::new("the inertial estimate cannot be integrated again").because(e))
     }
@@ -57,11 +55,7 @@ pub(super) struct Motion<'a> {
 
 impl Motion<'_> {
     /// Poses at stamps, the errors taken out.
-    pub(super) fn poses_at(
-        &self,
-        theta: &Theta,
-        stamps: &[Stamp],
-    ) -> DataResult<PosesAtFrames> {
+    pub(super) fn poses_at(&self, theta: &Theta, stamps: &[Stamp]) -> DataResult<PosesAtFrames> {
         let offset_s = theta.of(Flaw::ClockOffset)[0];
         let too_late = Span::from_secs_f64(offset_s)
             .map_err(|e| DataError::new("the clock offset is no span of time").because(e))?;
@@ -89,8 +83,7 @@ fn without_drift<'t>(trajectory: Cow<'t, Trajectory>, theta: &Theta) -> Cow<'t, 
         return trajectory;
     }
     let start = trajectory.start();
-    let back =
-        |seconds: f64| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -yaw_rate * seconds);
+    let back = |seconds: f64| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -yaw_rate * seconds);
     let first = trajectory.poses()[0].translation();
     let (mut before_s, mut before, mut position) = (0.0, first, first);
     Cow::Owned(trajectory.map_poses(|stamp, pose| {

@@ -76,7 +76,9 @@ impl Noise {
     pub(super) fn weights(&self, residuals: &[Residual], blocks: &Blocks) -> Vec<f64> {
         let mut weights = vec![1.0; residuals.len()];
         for cell in &blocks.cells {
-            let Some(precision) = self.covariance(cell, |_| 1.0).cholesky().map(|c| c.inverse()) else { continue };
+            let Some(precision) = self.covariance(cell, |_| 1.0).cholesky().map(|c| c.inverse()) else {
+                continue;
+            };
             let [u, v] = [0, 1].map(|axis| &precision * coordinate(residuals, cell, axis));
             for (i, label) in cell.labels.iter().enumerate() {
                 let deviations = u[i].hypot(v[i]) / precision[(i, i)].max(f64::MIN_POSITIVE).sqrt();
@@ -159,7 +161,8 @@ mod tests {
                     stamp: at(10_000 * segment + 100 * i),
                     keyframe: at(10_000 * segment),
                 });
-                let step = |random: &mut SplitMix, sigma: f64| Vector2::new(normal(random), normal(random)) * sigma;
+                let step =
+                    |random: &mut SplitMix, sigma: f64| Vector2::new(normal(random), normal(random)) * sigma;
                 walk += step(&mut random, 0.8 * 0.1_f64.sqrt());
                 let outlier = random.below(50) == 0;
                 outliers.push(outlier);
@@ -173,7 +176,8 @@ mod tests {
         assert!((noise.wander_px - 0.8).abs() < 0.25, "{noise:?}");
         let weights = noise.weights(&residuals, &blocks);
         let mean = |which: bool| {
-            let some: Vec<f64> = weights.iter().zip(&outliers).filter(|(_, o)| **o == which).map(|(w, _)| *w).collect();
+            let some: Vec<f64> =
+                weights.iter().zip(&outliers).filter(|(_, o)| **o == which).map(|(w, _)| *w).collect();
             some.iter().sum::<f64>() / some.len() as f64
         };
         assert!(mean(true) < 0.1 && mean(false) > 0.75, "{} {}", mean(true), mean(false));

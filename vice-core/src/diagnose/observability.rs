@@ -38,7 +38,8 @@ impl Observability {
     /// Number of directions that show. `noise` is what the best fit leaves.
     pub(super) fn rank(&self, blocks: &Blocks, noise: &Noise) -> usize {
         // Labels of a segment err alike: the cells are what is independent.
-        let threshold_px = SEEN * noise.after_px(blocks.typical_seconds()) / (blocks.cells.len().max(1) as f64).sqrt();
+        let threshold_px =
+            SEEN * noise.after_px(blocks.typical_seconds()) / (blocks.cells.len().max(1) as f64).sqrt();
         self.effects_px.iter().filter(|e| **e >= threshold_px).count()
     }
 }
@@ -46,7 +47,8 @@ impl Observability {
 /// How much of the pixels that one fit accounts for another could account for as well, 0 to 1: the squared cosine of
 /// the angle between the first one's correction and all that the second one's parameters can do.
 pub(super) fn overlap(of: &Fit, with: &Fit) -> f64 {
-    let field = stacked(of) * DVector::from_iterator(of.parameters.len(), of.parameters.iter().map(|p| of.theta[*p]));
+    let field =
+        stacked(of) * DVector::from_iterator(of.parameters.len(), of.parameters.iter().map(|p| of.theta[*p]));
     let columns = stacked(with) * DMatrix::from_diagonal(&typical(with));
     let length = field.norm_squared();
     if length == 0.0 {

@@ -145,9 +145,8 @@ impl<'a> Problem<'a> {
     }
 
     fn tracked(&self, theta: &Theta) -> Result<Vec<(Arc<str>, Stamp, Residual)>, DiagnoseError> {
-        let camera = theta
-            .correct_camera(self.camera)
-            .map_err(|e| DiagnoseError::CannotEvaluate(e.to_string()))?;
+        let camera =
+            theta.correct_camera(self.camera).map_err(|e| DiagnoseError::CannotEvaluate(e.to_string()))?;
         let cameras: CamerasAtFrames =
             self.cameras.iter().map(|c| c.map(|c| theta.correct_extrinsics(&c))).collect();
         let poses = self

@@ -99,7 +99,8 @@ pub fn sensitivity(
         for (i, parameter) in fit.parameters.iter().enumerate() {
             let effect_px = Observability::of_parameter(fit, i).strongest_px;
             // What one deviation of the noise amounts to, if the cells of points and blocks are independent.
-            let bound = sigma_px * PARAMETERS[*parameter].typical / (effect_px * (blocks.cells.len() as f64).sqrt());
+            let bound =
+                sigma_px * PARAMETERS[*parameter].typical / (effect_px * (blocks.cells.len() as f64).sqrt());
             let found_from = DETECTED * deviations.get(i).copied().unwrap_or(f64::INFINITY).max(bound);
             let points = curve(&problem, *parameter)?;
             curves.push(Curve {

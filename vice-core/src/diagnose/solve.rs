@@ -170,7 +170,8 @@ impl Fit {
                 let Some(whitener) = whitener else { return piece };
                 for axis in [0, 1] {
                     let columns = whitener.apply(self.columns(cell, axis));
-                    let residuals = whitener.apply(DMatrix::from_columns(&[coordinate(&self.residuals, cell, axis)]));
+                    let residuals =
+                        whitener.apply(DMatrix::from_columns(&[coordinate(&self.residuals, cell, axis)]));
                     piece.hessian += columns.transpose() * &columns;
                     piece.gradient += columns.transpose() * residuals.column(0);
                 }

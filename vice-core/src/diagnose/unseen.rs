@@ -87,9 +87,8 @@ impl Unseen {
             return 0.0;
         }
         let mut random = SplitMix(seed);
-        let better = (0..resamples).filter(|_| {
-            (0..count).map(|_| gains[random.below(count as u64) as usize]).sum::<f64>() > 0.0
-        });
+        let better = (0..resamples)
+            .filter(|_| (0..count).map(|_| gains[random.below(count as u64) as usize]).sum::<f64>() > 0.0);
         let share = better.count() as f64 / resamples as f64;
         share.min(1.0 - 0.5_f64.powi(count as i32))
     }

@@ -65,9 +65,8 @@ fn decimals(width: f64) -> usize {
 
 /// What to do about a flaw, given the clock offset that was in use.
 pub(super) fn correction(flaw: Flaw, values: &[f64], time_offset_s: f64) -> String {
-    let all = |scale: f64| {
-        values.iter().map(|v| format!("{:+.6}", -v * scale)).collect::<Vec<_>>().join(", ")
-    };
+    let all =
+        |scale: f64| values.iter().map(|v| format!("{:+.6}", -v * scale)).collect::<Vec<_>>().join(", ");
     match flaw {
         Flaw::ClockOffset => format!("--time-offset {:.6}", time_offset_s - values[0]),
         Flaw::ExtrinsicRotation => {
@@ -117,7 +116,10 @@ mod tests {
             line(Flaw::ExtrinsicRotation, &turn, Some(&size)),
             "extrinsic rotation: 0.57° [0.52, 0.63] (x +0.00, y +0.57, z +0.00°)"
         );
-        assert_eq!(listed(&[Flaw::Scale, Flaw::Drift, Flaw::ClockOffset], "and"), "scale, drift and clock offset");
+        assert_eq!(
+            listed(&[Flaw::Scale, Flaw::Drift, Flaw::ClockOffset], "and"),
+            "scale, drift and clock offset"
+        );
     }
 
     #[test]
