@@ -1,6 +1,6 @@
 //! Flights in memory with one known flaw each, for the diagnosis: no image is rendered.
 //!
-//! The flight is that of the synthetic adapter, 30 s in an empty room whose depth is known exactly; an estimate that is
+//! The flight is that of the synthetic adapter, 40 s in an empty room whose depth is known exactly; an estimate that is
 //! not inertial turns about all axes besides, as something carried by hand does. Labels have
 //! 0.5 px of noise and one in fifty is off by 10 px, key frames too. The estimate has the errors of a visual-inertial
 //! odometry: position and yaw wander at random, roll and pitch sway about the truth, all of it jitters. With 4 mm and
@@ -92,7 +92,7 @@ impl Flawed {
     /// If the flight is not what it should be.
     pub fn with(truth: Theta, inertial: bool, seed: u64) -> Self {
         let flight = Flight::new(seed);
-        let seconds = if inertial { 10.0 } else { 30.0 };
+        let seconds = if inertial { 10.0 } else { 40.0 };
         let camera = Camera::new(
             752,
             480,

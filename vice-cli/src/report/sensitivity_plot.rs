@@ -37,7 +37,7 @@ fn draw_panel(picture: &mut Picture, document: &SensitivityDocument, curves: &[C
         x: Axis::exactly(points().map(|p| p.size * scale), 6),
         y: Axis::from_zero(points().map(|p| p.rmse_px), 4),
     };
-    panel.draw_axes(picture, Some(&format!("{}, {unit}", first.flaw.words())), "RMSE_2D, px");
+    panel.draw_axes(picture, Some(&format!("{}, {unit}", first.flaw.words())), Some("RMSE_2D, px"));
     let now = panel.place_y(document.rmse_px);
     picture.line("mark", [(panel.left, now), (panel.left + panel.width, now)]);
     for (index, curve) in curves.iter().enumerate() {

@@ -15,8 +15,8 @@ const FLOOR_PX: f64 = 0.01;
 const SHARED_SIGMAS: f64 = 10.0;
 /// Fewer labels than this in a cell share nothing that could be told from their own noise.
 const SHARING: usize = 3;
-/// Labels this many deviations from what their neighbours say have half the weight.
-const CAUCHY: f64 = 3.0;
+/// Labels further than this many deviations from what their neighbours say are outliers, and weigh less.
+const OUTLIER: f64 = 3.0;
 
 /// Standard deviations of one coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,7 +82,7 @@ impl Noise {
             let [u, v] = [0, 1].map(|axis| &precision * coordinate(residuals, cell, axis));
             for (i, label) in cell.labels.iter().enumerate() {
                 let deviations = u[i].hypot(v[i]) / precision[(i, i)].max(f64::MIN_POSITIVE).sqrt();
-                weights[*label] = 1.0 / (1.0 + (deviations / CAUCHY).powi(2));
+                weights[*label] = (OUTLIER / deviations.max(OUTLIER)).powi(2);
             }
         }
         weights
@@ -180,6 +180,6 @@ mod tests {
                 weights.iter().zip(&outliers).filter(|(_, o)| **o == which).map(|(w, _)| *w).collect();
             some.iter().sum::<f64>() / some.len() as f64
         };
-        assert!(mean(true) < 0.1 && mean(false) > 0.75, "{} {}", mean(true), mean(false));
+        assert!(mean(true) < 0.15 && mean(false) > 0.95, "{} {}", mean(true), mean(false));
     }
 }
