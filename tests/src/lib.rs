@@ -4,6 +4,8 @@
 //! folder that the test itself was built in.
 #![allow(clippy::expect_used, clippy::panic, clippy::print_stderr)] // A test helper fails its test.
 
+pub mod flawed;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;

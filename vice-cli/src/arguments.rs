@@ -34,6 +34,8 @@ pub(crate) enum Command {
     Demo(commands::demo::Args),
     /// Evaluate pose estimates against labelled key points.
     Evaluate(Box<commands::evaluate::Args>),
+    /// Find the flaw that explains the pixel errors of an estimate.
+    Diagnose(Box<commands::diagnose::Args>),
     /// Compare two trajectories: APE, RPE, RMSE_3D, AOE, ROE.
     Trajectory(commands::trajectory::Args),
     /// Label key points in the browser, by hand and with a tracker.
@@ -50,6 +52,8 @@ pub(crate) enum Command {
     /// The floor plane.
     #[command(subcommand)]
     Floor(commands::floor::Command),
+    /// Show how RMSE_2D answers to each flaw, and which sizes the labels can show.
+    Sensitivity(Box<commands::sensitivity::Args>),
     /// Write a rendered flight with exact labels and flawed estimates, in the EuRoC layout.
     Synth(commands::synth::Args),
     /// Work with labels files.

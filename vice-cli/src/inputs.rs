@@ -12,7 +12,7 @@ pub(crate) use estimates::SceneEstimates;
 pub(crate) use evaluation::{EvaluationArgs, Scoring};
 pub(crate) use open::{DatasetArgs, setting, split_list};
 pub(crate) use outputs::Outputs;
-pub(crate) use streams::{StreamArgs, load_streams};
+pub(crate) use streams::{LoadedStreams, StreamArgs, load_streams};
 
 use std::path::PathBuf;
 

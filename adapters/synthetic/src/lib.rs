@@ -13,7 +13,7 @@ mod labels;
 mod options;
 mod pattern;
 mod render;
-mod rng;
+pub mod rng;
 mod scene;
 mod sensors;
 mod target;

@@ -13,6 +13,7 @@ mod commands;
 mod depth_oracle;
 mod detect;
 mod detect_rendered;
+mod diagnose;
 mod euroc_oracle;
 mod evaluate_oracle;
 mod locobot_oracle;

@@ -10,7 +10,7 @@ use vice_core::evaluate::{EvaluateError, Evaluation, Observations, Selection, ev
 use vice_core::metrics::align::Alignment;
 use vice_core::result::{ResultDocument, Settings};
 
-use super::{DatasetArgs, DepthArgs, LabelArgs, StreamArgs, load_streams, split_list};
+use super::{DatasetArgs, DepthArgs, LabelArgs, LoadedStreams, StreamArgs, load_streams, split_list};
 use crate::terminal::{Verbosity, usage};
 
 /// Data set, labels, pose streams and depth.
@@ -44,9 +44,36 @@ impl EvaluationArgs {
         scoring: &Scoring,
         verbosity: Verbosity,
     ) -> anyhow::Result<(ResultDocument, Arc<dyn Dataset>)> {
+        let dataset = self.dataset.open()?;
+        let document = self.with_evaluation_of(&dataset, scoring, |evaluation, _| {
+            let bar = verbosity.progress("evaluating");
+            let document = evaluate(evaluation, &|done, total| {
+                bar.set_length(total as u64);
+                bar.set_position(done as u64);
+            })?;
+            bar.finish_and_clear();
+            Ok(document)
+        })?;
+        Ok((document, dataset))
+    }
+
+    /// Opens everything that an evaluation needs and hands it to `work`.
+    pub(crate) fn with_evaluation<T>(
+        &self,
+        scoring: &Scoring,
+        work: impl FnOnce(&Evaluation<'_>, &LoadedStreams) -> anyhow::Result<T>,
+    ) -> anyhow::Result<T> {
+        self.with_evaluation_of(&self.dataset.open()?, scoring, work)
+    }
+
+    fn with_evaluation_of<T>(
+        &self,
+        dataset: &Arc<dyn Dataset>,
+        scoring: &Scoring,
+        work: impl FnOnce(&Evaluation<'_>, &LoadedStreams) -> anyhow::Result<T>,
+    ) -> anyhow::Result<T> {
         let calibration = self.depth_options.calibration()?;
         let floor = self.depth_options.floor()?;
-        let dataset = self.dataset.open()?;
         let used = self.dataset.used_camera(dataset.as_ref(), calibration.as_ref())?;
         tracing::info!(
             "{} ({}): camera {} with {} frames",
@@ -75,7 +102,7 @@ impl EvaluationArgs {
             let t = &stream.trajectory;
             tracing::info!("stream {}: {} poses, {} to {} ns", stream.name, t.len(), t.start(), t.end());
         }
-        let sources = self.depth_options.sources("--depth", &self.depth, &dataset, &used.name)?;
+        let sources = self.depth_options.sources("--depth", &self.depth, dataset, &used.name)?;
         let sources: Vec<&dyn DepthSource> = sources.iter().map(AsRef::as_ref).collect();
         let settings = Settings {
             dataset: Some(self.dataset.path.display().to_string()),
@@ -111,13 +138,7 @@ impl EvaluationArgs {
             keep_samples: scoring.keep_samples,
             settings,
         };
-        let bar = verbosity.progress("evaluating");
-        let document = evaluate(&evaluation, &|done, total| {
-            bar.set_length(total as u64);
-            bar.set_position(done as u64);
-        })?;
-        bar.finish_and_clear();
-        Ok((document, dataset))
+        work(&evaluation, &streams)
     }
 
     /// Whether a depth source needs the camera's place in the world: a depth camera and a floor under the body do not.

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use nalgebra::Vector3;
 use vice_core::dataset::{Dataset, GROUND_TRUTH};
+use vice_core::diagnose::InertialRun;
 use vice_core::evaluate::{Selection, Stream};
 use vice_core::frames::{Body, BodyFromCamera, Rigid, Sensor, WorldFromBody, WorldFromCamera};
-use vice_core::imu::{GRAVITY_Z_UP_M_S2, ImuSample, InertialState, fit_velocity, integrate_euler};
+use vice_core::imu::{GRAVITY_Z_UP_M_S2, ImuSample, InertialState, fit_velocity};
 use vice_core::metrics::associate::{Matching, PosePairs};
 use vice_core::metrics::rotation_offset::RotationOffset;
 use vice_core::result::Role;
@@ -59,6 +60,15 @@ pub(crate) struct LoadedStreams {
     pub(crate) list: Vec<Stream>,
     pub(crate) anchor: usize,
     pub(crate) time_offset: Span,
+    /// The integration behind a stream, by its index.
+    inertial: Option<(usize, InertialRun)>,
+}
+
+impl LoadedStreams {
+    /// How a stream was integrated, where it was.
+    pub(crate) fn inertial_run(&self, stream: usize) -> Option<&InertialRun> {
+        self.inertial.as_ref().filter(|(index, _)| *index == stream).map(|(_, run)| run)
+    }
 }
 
 pub(crate) fn load_streams(
@@ -73,8 +83,19 @@ pub(crate) fn load_streams(
     let mut loader = Loader { args, dataset, used, selection, time_offset, world_depth, reference: None };
     loader.reference = loader.load_reference()?;
     let mut list: Vec<Stream> = loader.reference.iter().cloned().collect();
+    let mut inertial = None;
     for name in split_list(&args.estimate) {
-        let trajectory = loader.estimate(&name)?;
+        let trajectory = match name == IMU_EULER && !loader.is_stream(&name) {
+            true => {
+                let run = loader.imu_euler()?;
+                let trajectory = run
+                    .integrate(Span::ZERO, Vector3::zeros())
+                    .with_context(|| format!("--estimate {IMU_EULER}"))?;
+                inertial = Some((list.len(), run));
+                trajectory
+            }
+            false => loader.estimate(&name)?,
+        };
         let stream = Stream { name: stream_name(&name, &list), role: Role::Estimate, trajectory };
         if let (Some(reference), false) = (&loader.reference, name == IMU_EULER) {
             warn_of_rotation(reference, &stream, args.max_gap);
@@ -86,7 +107,9 @@ pub(crate) fn load_streams(
         return Err(usage("--estimate: no estimate is named"));
     }
     let anchor = loader.anchor(&mut list)?;
-    Ok(LoadedStreams { list, anchor, time_offset })
+    // An initial pose moves the anchor to another world than it was integrated in.
+    let inertial = inertial.filter(|(index, _)| args.initial_pose.is_none() || *index != anchor);
+    Ok(LoadedStreams { list, anchor, time_offset, inertial })
 }
 
 struct Loader<'a> {
@@ -117,9 +140,6 @@ impl Loader<'_> {
     }
 
     fn estimate(&self, name: &str) -> anyhow::Result<Trajectory> {
-        if name == IMU_EULER && !self.is_stream(name) {
-            return self.imu_euler();
-        }
         let trajectory = match self.is_stream(name) {
             true => self.dataset.trajectory(name)?,
             false => self.to_body(self.file(name, "--estimate")?)?,
@@ -174,7 +194,7 @@ impl Loader<'_> {
     }
 
     /// Euler integration of the IMU from the reference state at the first key frame to the last evaluated frame.
-    fn imu_euler(&self) -> anyhow::Result<Trajectory> {
+    fn imu_euler(&self) -> anyhow::Result<InertialRun> {
         let samples = self.dataset.imu()?;
         anyhow::ensure!(!samples.is_empty(), "--estimate {IMU_EULER}: the data set has no inertial samples");
         let reference = self.reference.as_ref().ok_or_else(|| {
@@ -190,8 +210,7 @@ impl Loader<'_> {
         warn_of_gap(&samples, start, last, self.args.max_gap);
         // A little beyond, so that the last frame lies between two states.
         let end = last + Span::from_millis(1000);
-        integrate_euler(&samples, &state, end, GRAVITY_Z_UP_M_S2)
-            .with_context(|| format!("--estimate {IMU_EULER}"))
+        Ok(InertialRun { samples, start: state, end, gravity_m_s2: GRAVITY_Z_UP_M_S2 })
     }
 
     fn start_state(&self, reference: &Stream, stamp: Stamp) -> anyhow::Result<InertialState> {

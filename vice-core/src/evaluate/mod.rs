@@ -13,6 +13,7 @@ mod curves;
 mod score;
 mod select;
 mod streams;
+pub(crate) mod trial;
 
 use std::collections::BTreeMap;
 

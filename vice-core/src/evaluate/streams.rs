@@ -22,14 +22,14 @@ pub struct Stream {
 }
 
 /// A pose for each selected frame, or why there is none.
-pub(super) type PosesAtFrames = Vec<Result<WorldFromBody, NoPose>>;
+pub(crate) type PosesAtFrames = Vec<Result<WorldFromBody, NoPose>>;
 
 impl Stream {
     pub(super) fn poses_at(&self, frames: &[Stamp], selected: &[usize], max_gap: Span) -> PosesAtFrames {
         selected.iter().map(|frame| self.trajectory.pose_at(frames[*frame], max_gap)).collect()
     }
 
-    pub(super) fn check_overlap(&self, frames: (Stamp, Stamp)) -> Result<(), EvaluateError> {
+    pub(crate) fn check_overlap(&self, frames: (Stamp, Stamp)) -> Result<(), EvaluateError> {
         let poses = (self.trajectory.start(), self.trajectory.end());
         if poses.0 <= frames.1 && frames.0 <= poses.1 {
             return Ok(());

@@ -1,0 +1,183 @@
+//! How RMSE_2D answers to each flaw, and which size of it the labels at hand can show.
+//!
+//! A flaw is injected into what is in use, both ways round, and the error is scored as an evaluation would. The
+//! document is `vice.sensitivity/1`.
+
+use serde::{Deserialize, Serialize};
+
+use super::blocks::Blocks;
+use super::bootstrap::Resampled;
+use super::flaw::{Flaw, PARAMETERS};
+use super::problem::{Problem, rmse_px};
+use super::solve::Fit;
+use super::theta::Theta;
+use super::verdict::singles;
+use super::{DiagnoseError, Diagnosis, check_labels, flaws_of, labels_part, least_noise};
+use super::{LabelsPart, Observability};
+
+/// The schema's name and version.
+pub const SENSITIVITY_SCHEMA: &str = "vice.sensitivity/1";
+
+/// Injected sizes, in typical ones.
+const SIZES: [f64; 8] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
+/// So many standard deviations a flaw must have to be found nineteen times of twenty at 95 %: 1.96 + 1.645.
+const DETECTED: f64 = 3.6;
+/// An RMSE_2D that is larger by this share is seen.
+const SEEN_SHARE: f64 = 0.1;
+
+/// The document.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SensitivityDocument {
+    /// [`SENSITIVITY_SCHEMA`].
+    pub schema: String,
+    /// Version of VICE that wrote it.
+    pub vice_version: String,
+    /// Name of the data set.
+    pub dataset: String,
+    /// The camera.
+    pub camera: String,
+    /// The pose stream.
+    pub stream: String,
+    /// The depth source.
+    pub depth: String,
+    /// What the flaws are injected against.
+    pub labels: LabelsPart,
+    /// RMSE_2D as it is, pixels.
+    pub rmse_px: f64,
+    /// One curve for each parameter of each flaw.
+    pub curves: Vec<Curve>,
+}
+
+/// How RMSE_2D answers to one parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Curve {
+    /// The flaw.
+    pub flaw: Flaw,
+    /// Its parameter, with the unit.
+    pub parameter: String,
+    /// Injected sizes and the RMSE_2D with them, the mean square over both signs.
+    pub points: Vec<CurvePoint>,
+    /// The size at which RMSE_2D is 10 % larger than it is now; null where none that was tried does it.
+    pub seen_from: Option<f64>,
+    /// The smallest size that a diagnosis finds nineteen times of twenty if it is the only flaw; null where no
+    /// plausible size is found.
+    pub found_from: Option<f64>,
+}
+
+/// One injection.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CurvePoint {
+    /// Size, in the parameter's unit.
+    pub size: f64,
+    /// RMSE_2D, pixels.
+    pub rmse_px: f64,
+}
+
+/// Injects each flaw at growing size. `progress` is called with (done, total) as flaws are done.
+///
+/// # Errors
+/// [`DiagnoseError`] if there is too little to fit to or the stream cannot be evaluated.
+pub fn sensitivity(
+    diagnosis: &Diagnosis<'_>,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<SensitivityDocument, DiagnoseError> {
+    let Diagnosis { evaluation, stream, depth, inertial, options, .. } = *diagnosis;
+    let flaws = flaws_of(diagnosis)?;
+    let problem = Problem::new(evaluation, stream, depth, inertial)?;
+    let blocks = Blocks::new(&problem.labels);
+    let labels = labels_part(&problem, &blocks);
+    check_labels(&labels)?;
+    let mut done = 0;
+    let fits = singles(&problem, &blocks, &flaws, || {
+        done += 1;
+        progress(done, 2 * flaws.len());
+    })?;
+    let sigma_px = least_noise(&fits, &problem, &blocks).after_px(blocks.typical_seconds());
+    let mut curves = Vec::new();
+    for fit in &fits {
+        let deviations = Resampled::new(fit, &blocks, options.resamples, options.seed).deviations();
+        for (i, parameter) in fit.parameters.iter().enumerate() {
+            let effect_px = Observability::of_parameter(fit, i).strongest_px;
+            // What one deviation of the noise amounts to, if the cells of points and blocks are independent.
+            let bound =
+                sigma_px * PARAMETERS[*parameter].typical / (effect_px * (blocks.cells.len() as f64).sqrt());
+            let found_from = DETECTED * deviations.get(i).copied().unwrap_or(f64::INFINITY).max(bound);
+            let points = curve(&problem, *parameter)?;
+            curves.push(Curve {
+                flaw: fit.flaws[0],
+                parameter: PARAMETERS[*parameter].name.to_string(),
+                seen_from: seen_from(rmse_px(&problem.base), &points),
+                found_from: (found_from < PARAMETERS[*parameter].plausible).then_some(found_from),
+                points,
+            });
+        }
+        done += 1;
+        progress(done, 2 * flaws.len());
+    }
+    Ok(SensitivityDocument {
+        schema: SENSITIVITY_SCHEMA.to_string(),
+        vice_version: env!("CARGO_PKG_VERSION").to_string(),
+        dataset: evaluation.dataset.name().to_string(),
+        camera: evaluation.camera_name.to_string(),
+        stream: evaluation.streams[stream].name.clone(),
+        depth: evaluation.depths[depth].name().to_string(),
+        labels,
+        rmse_px: rmse_px(&problem.base),
+        curves,
+    })
+}
+
+/// RMSE_2D over injected sizes, nothing injected first.
+fn curve(problem: &Problem<'_>, parameter: usize) -> Result<Vec<CurvePoint>, DiagnoseError> {
+    let mut points = vec![CurvePoint { size: 0.0, rmse_px: rmse_px(&problem.base) }];
+    for times in SIZES {
+        let size = times * PARAMETERS[parameter].typical;
+        let mut sum = 0.0;
+        for sign in [-1.0, 1.0] {
+            let mut theta = Theta::zero();
+            theta[parameter] = sign * size;
+            sum += rmse_px(&problem.residuals(&theta)?).powi(2);
+        }
+        points.push(CurvePoint { size, rmse_px: (0.5 * sum).sqrt() });
+    }
+    Ok(points)
+}
+
+/// Where the curve first crosses 10 % more than now, linear in the squares between the sizes tried.
+fn seen_from(now_px: f64, points: &[CurvePoint]) -> Option<f64> {
+    let limit = (now_px * (1.0 + SEEN_SHARE)).powi(2);
+    points.windows(2).find_map(|pair| {
+        let [a, b] = [pair[0], pair[1]];
+        let (low, high) = (a.rmse_px.powi(2), b.rmse_px.powi(2));
+        let share = (limit - low) / (high - low);
+        // The square of the error grows with the square of the size.
+        (low <= limit && high > limit)
+            .then(|| (a.size.powi(2) + share * (b.size.powi(2) - a.size.powi(2))).sqrt())
+    })
+}
+
+/// The part of a fit's parameters that one of them is.
+impl Observability {
+    fn of_parameter(fit: &Fit, index: usize) -> Self {
+        let alone = Fit {
+            parameters: vec![fit.parameters[index]],
+            jacobian: vec![fit.jacobian[index].clone()],
+            ..fit.clone()
+        };
+        Self::of(&alone)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_is_seen_where_it_is_a_tenth_higher() {
+        let at = |size: f64| CurvePoint { size, rmse_px: (1.0 + 4.0 * size * size).sqrt() };
+        let points = [at(0.0), at(0.1), at(0.2), at(0.4)];
+        let seen = seen_from(1.0, &points).unwrap();
+        assert!((4.0 * seen * seen - 0.21).abs() < 1e-9, "{seen}");
+        assert_eq!(seen_from(1.0, &points[..2]), None);
+    }
+}

@@ -1,0 +1,130 @@
+//! Flaws and verdicts in words.
+
+use super::document::Estimated;
+use super::flaw::Flaw;
+
+/// `clock offset: +50.3 ms [49.1, 51.6]`.
+pub(super) fn line(flaw: Flaw, parameters: &[Estimated], size: Option<&Estimated>) -> String {
+    let numbers = match (flaw, parameters, size) {
+        (Flaw::ClockOffset, [offset], _) => number(offset, 1e3, "ms", true),
+        (Flaw::FocalLength | Flaw::Scale, [share], _) => number(share, 1e2, "%", true),
+        (Flaw::ExtrinsicRotation, [x, y, z], Some(size)) => {
+            format!("{} ({})", number(size, DEGREES, "°", false), axes(&[x, y, z], DEGREES, "°"))
+        }
+        (Flaw::ExtrinsicTranslation, [x, y, z], Some(size)) => {
+            format!("{} ({})", number(size, 1e3, "mm", false), axes(&[x, y, z], 1e3, "mm"))
+        }
+        (Flaw::InitialTilt, [x, y], Some(size)) => {
+            format!("{} ({})", number(size, DEGREES, "°", false), axes(&[x, y], DEGREES, "°"))
+        }
+        (Flaw::PrincipalPoint, [u, v], _) => {
+            format!("u {}, v {}", number(u, 1.0, "px", true), number(v, 1.0, "px", true))
+        }
+        (Flaw::Drift, [x, y, z, yaw], Some(size)) => format!(
+            "{} ({}), yaw {}",
+            number(size, 1e3, "mm/s", false),
+            axes(&[x, y, z], 1e3, "mm/s"),
+            number(yaw, DEGREES, "°/s", true)
+        ),
+        (_, parameters, _) => {
+            parameters.iter().map(|p| number(p, 1.0, &p.name, true)).collect::<Vec<_>>().join(", ")
+        }
+    };
+    format!("{}: {numbers}", flaw.words())
+}
+
+const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+
+fn number(e: &Estimated, scale: f64, unit: &str, signed: bool) -> String {
+    let (value, low, high) = (e.value * scale, e.low * scale, e.high * scale);
+    let decimals = decimals(high - low);
+    let space = if unit.starts_with('°') { "" } else { " " };
+    let value = if signed { format!("{value:+.decimals$}") } else { format!("{value:.decimals$}") };
+    format!("{value}{space}{unit} [{low:.decimals$}, {high:.decimals$}]")
+}
+
+fn axes(parameters: &[&Estimated], scale: f64, unit: &str) -> String {
+    let widest = parameters.iter().map(|p| (p.high - p.low) * scale).fold(f64::INFINITY, f64::min);
+    let decimals = decimals(widest);
+    let axes: Vec<String> = ["x", "y", "z"]
+        .iter()
+        .zip(parameters)
+        .map(|(name, p)| format!("{name} {:+.decimals$}", p.value * scale))
+        .collect();
+    let space = if unit.starts_with('°') { "" } else { " " };
+    format!("{}{space}{unit}", axes.join(", "))
+}
+
+/// Two digits of the width of the interval are worth reading.
+fn decimals(width: f64) -> usize {
+    if !(width > 0.0 && width.is_finite()) {
+        return 3;
+    }
+    (1.0 - width.log10().floor()).clamp(0.0, 6.0) as usize
+}
+
+/// What to do about a flaw, given the clock offset that was in use.
+pub(super) fn correction(flaw: Flaw, values: &[f64], time_offset_s: f64) -> String {
+    let all =
+        |scale: f64| values.iter().map(|v| format!("{:+.6}", -v * scale)).collect::<Vec<_>>().join(", ");
+    match flaw {
+        Flaw::ClockOffset => format!("--time-offset {:.6}", time_offset_s - values[0]),
+        Flaw::ExtrinsicRotation => {
+            format!("turn body_from_camera on its right by the rotation vector [{}] rad", all(1.0))
+        }
+        Flaw::ExtrinsicTranslation => format!("add [{}] m to the translation of body_from_camera", all(1.0)),
+        Flaw::FocalLength => format!("multiply fx and fy by {:.6}", 1.0 / (1.0 + values[0])),
+        Flaw::PrincipalPoint => format!("add [{}] px to cx, cy", all(1.0)),
+        Flaw::InitialTilt => {
+            format!("turn the start of the integration about the world's x and y by [{}] rad", all(1.0))
+        }
+        Flaw::Scale => format!("multiply the translations of the estimate by {:.6}", 1.0 / (1.0 + values[0])),
+        Flaw::Drift => format!(
+            "the estimate drifts: calibrate its source; until then add [{}] (m/s, and rad/s of yaw) times the time",
+            all(1.0)
+        ),
+    }
+}
+
+/// `a`, `a and b`, `a, b and c`.
+pub(super) fn listed(flaws: &[Flaw], last: &str) -> String {
+    let words: Vec<&str> = flaws.iter().map(|f| f.words()).collect();
+    match words.as_slice() {
+        [] => String::new(),
+        [one] => (*one).to_string(),
+        [rest @ .., end] => format!("{} {last} {end}", rest.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn estimated(value: f64, low: f64, high: f64) -> Estimated {
+        Estimated { name: "n".to_string(), value, low, high }
+    }
+
+    #[test]
+    fn lines_say_value_unit_and_interval() {
+        let offset = [estimated(0.0503, 0.0491, 0.0516)];
+        assert_eq!(line(Flaw::ClockOffset, &offset, None), "clock offset: +50.3 ms [49.1, 51.6]");
+        let focal = [estimated(-0.03, -0.0312, -0.0291)];
+        assert_eq!(line(Flaw::FocalLength, &focal, None), "focal length: -3.00 % [-3.12, -2.91]");
+        let turn = [0.0, 0.01, 0.0].map(|v: f64| estimated(v, v - 0.001, v + 0.001));
+        let size = estimated(0.01, 0.009, 0.011);
+        assert_eq!(
+            line(Flaw::ExtrinsicRotation, &turn, Some(&size)),
+            "extrinsic rotation: 0.57° [0.52, 0.63] (x +0.00, y +0.57, z +0.00°)"
+        );
+        assert_eq!(
+            listed(&[Flaw::Scale, Flaw::Drift, Flaw::ClockOffset], "and"),
+            "scale, drift and clock offset"
+        );
+    }
+
+    #[test]
+    fn corrections_turn_the_sign() {
+        assert_eq!(correction(Flaw::ClockOffset, &[0.0503], 0.05), "--time-offset -0.000300");
+        assert_eq!(correction(Flaw::FocalLength, &[0.25], 0.0), "multiply fx and fy by 0.800000");
+    }
+}

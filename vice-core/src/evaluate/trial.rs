@@ -1,0 +1,82 @@
+//! A stream scored once more with another camera and other poses, by the same stages: what a diagnosis varies.
+
+use super::score::score;
+pub(crate) use super::streams::PosesAtFrames;
+use super::{DepthTable, EvaluateError, Evaluation, extrinsics, keyframe_depths};
+use crate::camera::Camera;
+use crate::depth::DepthSource;
+use crate::error::DataResult;
+use crate::frames::BodyFromCamera;
+use crate::metrics::align::Alignment;
+use crate::result::{Sample, Settings};
+use crate::time::Stamp;
+
+/// Extrinsics at the selected frames.
+pub(crate) type CamerasAtFrames = Vec<Option<BodyFromCamera>>;
+
+/// Depths of the key-frame pixels, to be used with several trials.
+pub(crate) struct TrialDepths(DepthTable);
+
+/// The stages of an evaluation, one by one.
+pub(crate) struct Trial<'a> {
+    evaluation: &'a Evaluation<'a>,
+}
+
+impl<'a> Trial<'a> {
+    pub(crate) const fn new(evaluation: &'a Evaluation<'a>) -> Self {
+        Self { evaluation }
+    }
+
+    /// Stamps of the selected frames, ascending: those of key frames and samples.
+    pub(crate) fn stamps(&self) -> Vec<Stamp> {
+        self.evaluation.selection.frames.iter().map(|f| self.evaluation.frames[*f]).collect()
+    }
+
+    /// The extrinsics as they are in use, at the selected frames.
+    pub(crate) fn cameras(&self) -> DataResult<CamerasAtFrames> {
+        extrinsics(self.evaluation)
+    }
+
+    /// Stage 3 with another camera and anchor.
+    pub(crate) fn depths(
+        &self,
+        source: &dyn DepthSource,
+        camera: &Camera,
+        cameras: &CamerasAtFrames,
+        anchor: &PosesAtFrames,
+    ) -> Result<TrialDepths, EvaluateError> {
+        keyframe_depths(&self.with(camera), source, cameras, anchor).map(TrialDepths)
+    }
+
+    /// Stage 4 with another camera and other poses: the scored samples by point and time.
+    pub(crate) fn samples(
+        &self,
+        camera: &Camera,
+        cameras: &CamerasAtFrames,
+        poses: &PosesAtFrames,
+        depths: &TrialDepths,
+    ) -> Vec<Sample> {
+        score(&self.with(camera), cameras, poses, &depths.0).samples
+    }
+
+    fn with<'b>(&'b self, camera: &'b Camera) -> Evaluation<'b> {
+        let e = self.evaluation;
+        Evaluation {
+            dataset: e.dataset,
+            camera_name: e.camera_name,
+            camera,
+            body_from_camera: e.body_from_camera,
+            frames: e.frames,
+            selection: e.selection,
+            streams: e.streams,
+            anchor: e.anchor,
+            depths: e.depths,
+            floor: e.floor,
+            max_gap: e.max_gap,
+            subsets: None,
+            align: Alignment::None,
+            keep_samples: true,
+            settings: Settings::default(),
+        }
+    }
+}
