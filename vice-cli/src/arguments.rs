@@ -67,6 +67,8 @@ pub(crate) enum Command {
     Overlay(Box<commands::overlay::Args>),
     /// Hold results side by side, label by label.
     Compare(commands::compare::Args),
+    /// Measure how fast points are projected here, beside the machine's limit.
+    Bench(commands::bench::Args),
     /// Print completions for a shell.
     Completions(commands::completions::Args),
 }

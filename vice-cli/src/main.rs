@@ -40,6 +40,7 @@ fn main() -> ExitCode {
         Command::Report(args) => commands::report::run(args, verbosity),
         Command::Overlay(args) => commands::overlay::run(args, verbosity),
         Command::Compare(args) => commands::compare::run(args),
+        Command::Bench(args) => commands::bench::run(args, verbosity),
         Command::Completions(args) => commands::completions::run(args),
     };
     match outcome {

@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use vice_core::dataset::Dataset;
+use vice_core::evaluate::SampleSink;
 use vice_core::metrics::align::Alignment;
 use vice_core::result::ResultDocument;
 
 use super::report::with_progress;
-use crate::inputs::{EvaluationArgs, Outputs, Scoring, to_json};
-use crate::report;
+use crate::inputs::{EvaluationArgs, Outputs, Scoring};
 use crate::report::html::{IMAGE_BUDGET_BYTES, Run, render};
+use crate::report::{self, sample_lines};
 use crate::terminal::{self, Outcome, Verbosity, usage};
 
 /// Arguments of `vice evaluate`.
@@ -48,9 +49,9 @@ struct ScoringArgs {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Output")]
 struct OutputArgs {
-    /// Which samples the JSON lists.
-    #[arg(long, value_name = "all|none", default_value = "all", value_parser = ["all", "none"])]
-    samples: String,
+    /// Where the scored samples go: into the JSON, nowhere, or one a line into a file beside it (FILE.samples.jsonl).
+    #[arg(long, value_enum, value_name = "HOW", default_value = "all")]
+    samples: Samples,
     /// Result document, vice.result/1; - prints it in place of the table.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -68,6 +69,14 @@ struct OutputArgs {
     rrd: Option<PathBuf>,
 }
 
+/// What becomes of the scored samples, of which a long run has millions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Samples {
+    All,
+    None,
+    Jsonl,
+}
+
 fn percent(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.0..=100.0).contains(&value) => Ok(value),
@@ -83,15 +92,20 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     if args.output.rrd.is_some() && !cfg!(feature = "rerun") {
         return Err(usage("--rrd: this vice was built without Rerun; build it with `--features rerun`"));
     }
+    let shown = args.output.report.is_some() || args.output.rrd.is_some();
+    let samples = samples_file(args)?;
     let scoring = Scoring {
         subsets: args.scoring.subsets.iter().map(|n| usize::from(*n)).collect(),
         align: args.scoring.align,
         // The page plots samples even where the document is to list none.
-        keep_samples: args.output.samples == "all"
-            || args.output.report.is_some()
-            || args.output.rrd.is_some(),
+        keep_samples: shown || (args.output.samples == Samples::All && args.output.json.is_some()),
     };
-    let (mut document, dataset) = args.evaluation.evaluate(&scoring, verbosity)?;
+    let (mut document, dataset) = match &samples {
+        Some(path) => sample_lines::write(path, |sink| {
+            args.evaluation.evaluate(&scoring, verbosity, Some(sink as &mut SampleSink<'_>))
+        })?,
+        None => args.evaluation.evaluate(&scoring, verbosity, None)?,
+    };
     let page = match &args.output.report {
         Some(path) => {
             let shots = with_progress(&document, dataset.as_ref(), IMAGE_BUDGET_BYTES, verbosity);
@@ -103,16 +117,11 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     if let Some(path) = &args.output.rrd {
         record(path, &document, dataset.as_ref())?;
     }
-    if args.output.samples == "none" {
+    if args.output.samples == Samples::None {
         document.drop_samples();
     }
-    // All texts are made before the first is written, so that a failure leaves nothing half done.
-    let json = args
-        .output
-        .json
-        .as_ref()
-        .map(|path| Ok::<_, anyhow::Error>((path, to_json(&document)?)))
-        .transpose()?;
+    // All texts are made before the first is written, so that a failure leaves nothing half done. The JSON may be too
+    // large to be one.
     let csv =
         args.output.csv.as_ref().map(|path| report::csv::render(&document).map(|t| (path, t))).transpose()?;
     let latex = args
@@ -121,8 +130,10 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         .as_ref()
         .map(|path| report::latex::render(&document).map(|t| (path, t)))
         .transpose()?;
-    let texts: Vec<(&PathBuf, String)> = [json, csv, latex, page].into_iter().flatten().collect();
-    if !outputs.write(&texts)? {
+    let texts: Vec<(&PathBuf, String)> = [csv, latex, page].into_iter().flatten().collect();
+    let json_printed =
+        args.output.json.as_ref().map_or(Ok(false), |path| outputs.write_json(path, &document))?;
+    if !(outputs.write(&texts)? || json_printed) {
         terminal::print(&report::table::render(&document))?;
     }
     let worst = document.worst_skipped_percent();
@@ -134,6 +145,27 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         return Ok(Outcome::TooManySkips);
     }
     Ok(Outcome::Done)
+}
+
+/// The file of samples beside the JSON, where it is asked for.
+fn samples_file(args: &Args) -> anyhow::Result<Option<PathBuf>> {
+    if args.output.samples != Samples::Jsonl {
+        return Ok(None);
+    }
+    if args.output.report.is_some() || args.output.rrd.is_some() {
+        return Err(usage("--samples jsonl keeps no samples that --report and --rrd could show; leave it out"));
+    }
+    match &args.output.json {
+        Some(json) if json.as_os_str() != "-" => {
+            let path = json.with_extension("samples.jsonl");
+            Outputs::new(
+                &[&Some(path.clone()), &args.output.csv, &args.output.latex],
+                &args.evaluation.files(),
+            )?;
+            Ok(Some(path))
+        }
+        _ => Err(usage("--samples jsonl writes beside the JSON: name a file with --json")),
+    }
 }
 
 #[cfg(feature = "rerun")]

@@ -48,7 +48,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         return Err(usage("--depth: name one source, since a frame shows one place for each stream"));
     }
     let scoring = Scoring { subsets: vec![], align: Alignment::None, keep_samples: true };
-    let (document, dataset) = args.evaluation.evaluate(&scoring, verbosity)?;
+    let (document, dataset) = args.evaluation.evaluate(&scoring, verbosity, None)?;
     let marks = Marks::of(&document, None)
         .ok_or_else(|| anyhow::anyhow!("no label could be scored, so that there is nothing to draw"))?;
     let frames = Frames { document: &document, dataset: dataset.as_ref(), marks: &marks };

@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use vice_core::dataset::{Dataset, Floor};
 use vice_core::depth::DepthSource;
-use vice_core::evaluate::{EvaluateError, Evaluation, Observations, Selection, evaluate};
+use vice_core::evaluate::{
+    EvaluateError, Evaluation, Observations, SampleSink, Selection, evaluate, evaluate_streaming,
+};
 use vice_core::metrics::align::Alignment;
 use vice_core::result::{ResultDocument, Settings};
 
@@ -38,19 +40,25 @@ pub(crate) struct Scoring {
 }
 
 impl EvaluationArgs {
-    /// Runs the pipeline; the data set comes with it for those who show its images.
+    /// Runs the pipeline; the data set comes with it for those who show its images. With a sink the samples go there, and
+    /// the document has none.
     pub(crate) fn evaluate(
         &self,
         scoring: &Scoring,
         verbosity: Verbosity,
+        sink: Option<&mut SampleSink<'_>>,
     ) -> anyhow::Result<(ResultDocument, Arc<dyn Dataset>)> {
         let dataset = self.dataset.open()?;
         let document = self.with_evaluation_of(&dataset, scoring, |evaluation, _| {
             let bar = verbosity.progress("evaluating");
-            let document = evaluate(evaluation, &|done, total| {
+            let progress = |done, total| {
                 bar.set_length(total as u64);
                 bar.set_position(done as u64);
-            })?;
+            };
+            let document = match sink {
+                Some(sink) => evaluate_streaming(evaluation, &progress, sink)?,
+                None => evaluate(evaluation, &progress)?,
+            };
             bar.finish_and_clear();
             Ok(document)
         })?;
