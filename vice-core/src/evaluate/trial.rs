@@ -56,7 +56,8 @@ impl<'a> Trial<'a> {
         poses: &PosesAtFrames,
         depths: &TrialDepths,
     ) -> Vec<Sample> {
-        score(&self.with(camera), cameras, poses, &depths.0).samples
+        // Only a sink can fail, and there is none.
+        score(&self.with(camera), cameras, poses, &depths.0, None).map_or_else(|_| Vec::new(), |all| all.samples)
     }
 
     fn with<'b>(&'b self, camera: &'b Camera) -> Evaluation<'b> {
