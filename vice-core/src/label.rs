@@ -4,7 +4,9 @@
 //! is lifted to 3D and carried along by each pose stream until the next key frame (a respawn). The observations after
 //! it are what the streams are scored against.
 
-use std::collections::BTreeMap;
+mod builder;
+
+pub use builder::LabelSetBuilder;
 
 use serde::{Deserialize, Serialize};
 
@@ -226,30 +228,11 @@ impl LabelSet {
     /// [`LabelError`] for a pixel that is not finite, a confidence that is none, an empty name, or a point labelled twice
     /// in a frame.
     pub fn from_rows(rows: impl IntoIterator<Item = LabelRow>) -> Result<Self, LabelError> {
-        let mut points: BTreeMap<NaturalName, Vec<Observation>> = BTreeMap::new();
+        let mut builder = LabelSetBuilder::default();
         for LabelRow { point, observation } in rows {
-            let (stamp, line) = (observation.stamp, observation.line);
-            if point.is_empty() {
-                return Err(LabelError::NoName { stamp, line });
-            }
-            if !(observation.px.u.is_finite() && observation.px.v.is_finite()) {
-                return Err(LabelError::NotFinite { point, stamp, line });
-            }
-            if let Some(confidence) = observation.provenance.confidence.filter(|c| !(0.0..=1.0).contains(c)) {
-                return Err(LabelError::Confidence { point, stamp, confidence, line });
-            }
-            points.entry(NaturalName::new(point)).or_default().push(observation);
+            builder.push(&point, observation)?;
         }
-        let mut sorted = Vec::with_capacity(points.len());
-        for (name, mut observations) in points {
-            let name = name.text;
-            observations.sort_by_key(|o| (o.stamp, o.line));
-            if let Some(pair) = observations.windows(2).find(|w| w[0].stamp == w[1].stamp) {
-                return Err(LabelError::Duplicate { point: name, stamp: pair[1].stamp, line: pair[1].line });
-            }
-            sorted.push(PointLabels { name, observations });
-        }
-        Ok(Self { points: sorted, dataset: None, camera: None })
+        builder.finish()
     }
 
     /// The points, in natural order of their names.

@@ -28,7 +28,7 @@ use crate::frames::BodyFromCamera;
 use crate::metrics::align::Alignment;
 use crate::metrics::pixel::{pooled_rmse_px, subset_rmse_px};
 use crate::result::{
-    DatasetPart, PixelPart, PointName, ResultDocument, SCHEMA, Settings, Skip, TrajectoryPart,
+    DatasetPart, PixelPart, PointName, ResultDocument, SCHEMA, Sample, Settings, Skip, TrajectoryPart,
 };
 use crate::time::{Span, Stamp};
 use crate::trajectory::NoPose;
@@ -193,6 +193,9 @@ pub enum EvaluateError {
         /// A unit that may be mixed up.
         suspicion: Option<String>,
     },
+    /// The scored samples could not be handed on.
+    #[error("the samples cannot be written")]
+    Samples(#[source] std::io::Error),
     /// The data set could not be read.
     #[error(transparent)]
     Data(#[from] DataError),
@@ -242,6 +245,9 @@ fn pixel_key(px: Pixel) -> PixelKey {
     (px.u.to_bits(), px.v.to_bits())
 }
 
+/// Takes the scored samples of one point, of the pose stream and depth source that are named.
+pub type SampleSink<'a> = dyn FnMut(&str, &str, &[Sample]) -> std::io::Result<()> + 'a;
+
 /// Runs the pipeline. `progress` is called with (done, total) as key frames and streams are finished.
 ///
 /// # Errors
@@ -249,6 +255,27 @@ fn pixel_key(px: Pixel) -> PixelKey {
 pub fn evaluate(
     evaluation: &Evaluation<'_>,
     progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<ResultDocument, EvaluateError> {
+    run(evaluation, progress, None)
+}
+
+/// [`evaluate`], but the samples go to `sink` as they come, in the order in which the document would list them, and
+/// are not kept: memory is that of a few points.
+///
+/// # Errors
+/// As [`evaluate`], and where the sink fails.
+pub fn evaluate_streaming(
+    evaluation: &Evaluation<'_>,
+    progress: &(dyn Fn(usize, usize) + Sync),
+    sink: &mut SampleSink<'_>,
+) -> Result<ResultDocument, EvaluateError> {
+    run(evaluation, progress, Some(sink))
+}
+
+fn run(
+    evaluation: &Evaluation<'_>,
+    progress: &(dyn Fn(usize, usize) + Sync),
+    mut sink: Option<&mut SampleSink<'_>>,
 ) -> Result<ResultDocument, EvaluateError> {
     let selection = evaluation.selection;
     let sizes = subset_sizes(evaluation.subsets, selection.point_count())?;
@@ -271,7 +298,12 @@ pub fn evaluate(
         done += 1;
         progress(done, total);
         for (stream, poses) in evaluation.streams.iter().zip(&poses) {
-            let scored = score::score(evaluation, &cameras, poses, &depths);
+            let to_sink: Option<score::TakePoint<'_>> = match &mut sink {
+                Some(sink) => Some(&mut |samples| sink(&stream.name, source.name(), samples)),
+                None => None,
+            };
+            let scored = score::score(evaluation, &cameras, poses, &depths, to_sink)
+                .map_err(EvaluateError::Samples)?;
             let rmse_px = subset_rmse_px(&scored.errors, &sizes);
             pixel.push(PixelPart {
                 stream: stream.name.clone(),

@@ -27,26 +27,39 @@ struct ScoredPoint {
     keyframes: Vec<KeyframePart>,
 }
 
+/// Points that are scored before their samples are handed on: enough for all threads, few enough for the memory.
+const POINTS_AT_A_TIME: usize = 32;
+
+/// Takes the samples of one point.
+pub(super) type TakePoint<'a> = &'a mut dyn FnMut(&[Sample]) -> std::io::Result<()>;
+
+/// Scores all points. Their samples go to `sink` where there is one, in the order of the points.
+///
+/// # Errors
+/// Those of the sink.
 pub(super) fn score(
     evaluation: &Evaluation<'_>,
     cameras: &[Option<BodyFromCamera>],
     poses: &PosesAtFrames,
     depths: &DepthTable,
-) -> Scored {
-    let points: Vec<ScoredPoint> = evaluation
-        .selection
-        .points
-        .par_iter()
-        .map(|point| Scorer { evaluation, cameras, poses, depths }.point(point))
-        .collect();
+    mut sink: Option<TakePoint<'_>>,
+) -> std::io::Result<Scored> {
+    let keep_samples = evaluation.keep_samples || sink.is_some();
+    let scorer = Scorer { evaluation, cameras, poses, depths, keep_samples };
     let mut all = Scored::default();
-    for point in points {
-        all.errors.push(point.errors);
-        all.samples.extend(point.samples);
-        all.skipped.extend(point.skipped);
-        all.keyframes.extend(point.keyframes);
+    for some in evaluation.selection.points.chunks(POINTS_AT_A_TIME) {
+        let points: Vec<ScoredPoint> = some.par_iter().map(|point| scorer.point(point)).collect();
+        for point in points {
+            all.errors.push(point.errors);
+            match &mut sink {
+                Some(sink) => sink(&point.samples)?,
+                None => all.samples.extend(point.samples),
+            }
+            all.skipped.extend(point.skipped);
+            all.keyframes.extend(point.keyframes);
+        }
     }
-    all
+    Ok(all)
 }
 
 struct Scorer<'a> {
@@ -54,6 +67,7 @@ struct Scorer<'a> {
     cameras: &'a [Option<BodyFromCamera>],
     poses: &'a PosesAtFrames,
     depths: &'a DepthTable,
+    keep_samples: bool,
 }
 
 impl Scorer<'_> {
@@ -103,7 +117,7 @@ impl Scorer<'_> {
                 Ok(tracked_px) => {
                     let error_px = tracked_px.distance_px(label.px);
                     scored.errors.add(error_px);
-                    if self.evaluation.keep_samples {
+                    if self.keep_samples {
                         scored.samples.push(Sample {
                             point: name.clone(),
                             timestamp_ns: label.stamp,

@@ -1,6 +1,5 @@
 //! Which frames and labels take part, before any pose is looked at.
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::{EvaluateError, SkipReason};
@@ -145,23 +144,24 @@ impl<'a> Selection<'a> {
         check_inside(labels, camera)?;
         let kept = KeptFrames::new(frames, window);
         let mut selection = Self { points: Vec::new(), frames: Vec::new(), in_window: Vec::new() };
-        let mut used = BTreeSet::new();
+        let mut used = vec![false; frames.len()];
+        let mut finder = FrameFinder { frames, next: 0 };
         let mut at_a_frame = false;
         for point in labels.points() {
             let mut selected =
                 SelectedPoint { name: point.name.as_str().into(), segments: vec![], skips: vec![] };
             for observation in point.before_first_keyframe() {
-                at_a_frame |= frames.binary_search(&observation.stamp).is_ok();
+                at_a_frame |= finder.find(observation.stamp).is_some();
                 if kept.covers(observation.stamp) {
                     selected.skips.push((observation.stamp, SkipReason::BeforeFirstKeyframe));
                 }
             }
             for segment in point.segments() {
-                let keyframe = frames.binary_search(&segment.keyframe.stamp).ok();
+                let keyframe = finder.find(segment.keyframe.stamp);
                 at_a_frame |= keyframe.is_some();
                 let mut samples = Vec::new();
                 for observation in segment.rest {
-                    let frame = frames.binary_search(&observation.stamp).ok();
+                    let frame = finder.find(observation.stamp);
                     at_a_frame |= frame.is_some();
                     if !kept.covers(observation.stamp) {
                         continue;
@@ -195,8 +195,8 @@ impl<'a> Selection<'a> {
                 {
                     continue;
                 }
-                used.insert(frame);
-                used.extend(samples.iter().map(|s| s.frame));
+                used[frame] = true;
+                samples.iter().for_each(|s| used[s.frame] = true);
                 let keyframe = Matched { observation: segment.keyframe, frame };
                 selected.segments.push(SelectedSegment { keyframe, samples });
             }
@@ -205,7 +205,7 @@ impl<'a> Selection<'a> {
         if !at_a_frame {
             return Err(no_label_at_a_frame(labels, (*first, *last)));
         }
-        selection.frames = used.into_iter().collect();
+        selection.frames = (0..frames.len()).filter(|f| used[*f]).collect();
         if selection.frames.is_empty() {
             let mut keyframes =
                 labels.points().iter().flat_map(|p| &p.observations).filter(|o| o.keyframe).peekable();
@@ -278,12 +278,29 @@ fn no_label_at_a_frame(labels: &LabelSet, frames: (Stamp, Stamp)) -> EvaluateErr
     }
 }
 
+/// Finds frames by their exact stamp. Labels mostly go from one frame to the next, so that is looked at first.
+struct FrameFinder<'a> {
+    frames: &'a [Stamp],
+    next: usize,
+}
+
+impl FrameFinder<'_> {
+    fn find(&mut self, stamp: Stamp) -> Option<usize> {
+        let frame = match self.frames.get(self.next) {
+            Some(next) if *next == stamp => self.next,
+            _ => self.frames.binary_search(&stamp).ok()?,
+        };
+        self.next = frame + 1;
+        Some(frame)
+    }
+}
+
 /// The frames of the window.
 struct KeptFrames {
     first: Stamp,
     last: Stamp,
     /// With a rate, the frames nearest to its ticks; without, all.
-    ticked: Option<BTreeSet<usize>>,
+    ticked: Option<Vec<bool>>,
 }
 
 impl KeptFrames {
@@ -293,7 +310,7 @@ impl KeptFrames {
         let ticked = window.fps.map(|fps| {
             let period_ns = 1e9 / fps;
             let end = last.min(frames[frames.len() - 1]);
-            let mut ticked = BTreeSet::new();
+            let mut ticked = vec![false; frames.len()];
             let mut next_frame = frames.partition_point(|s| *s < first);
             // Ticks between two frames all choose one of the two, so that walking frames, not ticks, bounds the work.
             while next_frame < frames.len() {
@@ -308,10 +325,10 @@ impl KeptFrames {
                 if first_tick <= last_tick {
                     // A tick in the middle chooses the earlier frame.
                     if let Some(before) = before.filter(|_| first_tick * period_ns <= middle) {
-                        ticked.insert(before);
+                        ticked[before] = true;
                     }
                     if last_tick * period_ns > middle {
-                        ticked.insert(next_frame);
+                        ticked[next_frame] = true;
                     }
                 }
                 next_frame += 1;
@@ -326,7 +343,7 @@ impl KeptFrames {
     }
 
     fn has(&self, frame: usize) -> bool {
-        self.ticked.as_ref().is_none_or(|t| t.contains(&frame))
+        self.ticked.as_ref().is_none_or(|t| t[frame])
     }
 }
 
@@ -338,7 +355,8 @@ mod tests {
         let frames: Vec<Stamp> = millis.iter().map(|m| Stamp::from_nanos(m * 1_000_000)).collect();
         let window =
             Window { fps: Some(fps), duration: duration_ms.map(Span::from_millis), ..Window::default() };
-        KeptFrames::new(&frames, &window).ticked.unwrap().into_iter().collect()
+        let ticked = KeptFrames::new(&frames, &window).ticked.unwrap();
+        (0..frames.len()).filter(|i| ticked[*i]).collect()
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! Many numbers side by side: how the batches of [`crate::camera`], [`crate::frames`] and [`crate::track`] reach the
 //! speed of the machine.
 //!
-//! A formula is written once for any [`Number`]. For `f64` it is the single-point function; for [`Lanes`] it works on a
-//! whole vector register of points. A [`Kernel`] is such a formula from numbers of a point to numbers of a point, and
-//! [`run`] drives it over slices: the widest instruction set is found out once while the program runs, points pass
+//! A formula is written once for any `Number`. For `f64` it is the single-point function; for `Lanes` it works on a
+//! whole vector register of points. A `Kernel` is such a formula from numbers of a point to numbers of a point, and
+//! `run` drives it over slices: the widest instruction set is found out once while the program runs, points pass
 //! memory once, nothing is allocated, and from a measured size on all threads share the work.
 //!
 //! Additions and products are never contracted, so that a point has the same bits in every instruction set, at every

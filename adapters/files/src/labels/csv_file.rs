@@ -4,10 +4,10 @@ use std::io::{self, Write};
 
 use vice_core::camera::Pixel;
 use vice_core::error::{DataError, DataResult};
-use vice_core::label::{LabelRow, LabelSet, Observation, ObservationSource};
+use vice_core::label::{LabelSet, LabelSetBuilder, Observation, ObservationSource};
 use vice_core::time::Stamp;
 
-use super::labels_from;
+use super::{label_error, no_labels};
 
 const OCCLUDED: &str = "occluded";
 const UNCERTAIN: &str = "uncertain";
@@ -25,15 +25,18 @@ pub fn read_csv(bytes: &[u8]) -> DataResult<LabelSet> {
     let heading = csv.headers().map_err(|e| csv_error(&e))?.clone();
     let heading_line = lines.at_end_of_record(csv.position());
     let columns = Columns::find(&heading).map_err(|e| e.line(heading_line))?;
-    let mut rows = Vec::new();
+    let mut labels = LabelSetBuilder::default();
+    let mut any = false;
     let mut record = csv::StringRecord::new();
     loop {
         let read = csv.read_record(&mut record);
         let line = lines.at_end_of_record(csv.position());
         if !read.map_err(|e| csv_error(&e).line(line))? {
-            return labels_from(rows);
+            return if any { labels.finish().map_err(|e| label_error(&e)) } else { Err(no_labels()) };
         }
-        rows.push(columns.row(&record, line).map_err(|e| e.line(line))?);
+        any = true;
+        let observation = columns.observation(&record, line).map_err(|e| e.line(line))?;
+        labels.push(columns.point(&record), observation).map_err(|e| label_error(&e))?;
     }
 }
 
@@ -122,7 +125,11 @@ impl Columns {
         Ok(columns)
     }
 
-    fn row(&self, record: &csv::StringRecord, line: u64) -> DataResult<LabelRow> {
+    fn point<'r>(&self, record: &'r csv::StringRecord) -> &'r str {
+        record.get(self.point).unwrap_or_default()
+    }
+
+    fn observation(&self, record: &csv::StringRecord, line: u64) -> DataResult<Observation> {
         let field = |column: usize| record.get(column).unwrap_or_default();
         let number = |column: usize, name: &str| {
             let text = field(column);
@@ -156,9 +163,7 @@ impl Columns {
             }
         }
         let px = Pixel::new(number(self.u_px, "u_px")?, number(self.v_px, "v_px")?);
-        let observation =
-            Observation { source, keyframe, occluded, uncertain, line, ..Observation::manual(stamp, px) };
-        Ok(LabelRow { point: field(self.point).to_string(), observation })
+        Ok(Observation { source, keyframe, occluded, uncertain, line, ..Observation::manual(stamp, px) })
     }
 }
 

@@ -116,13 +116,16 @@ fn no_labels() -> DataError {
 
 /// Rows, if there are any, as a validated set.
 fn validated(rows: Vec<LabelRow>) -> DataResult<LabelSet> {
-    LabelSet::from_rows(rows).map_err(|e: LabelError| {
-        let error = DataError::new(e.to_string());
-        match e.line() {
-            Some(line) => error.line(line),
-            None => error,
-        }
-    })
+    LabelSet::from_rows(rows).map_err(|e| label_error(&e))
+}
+
+/// With the line of the row at fault.
+fn label_error(e: &LabelError) -> DataError {
+    let error = DataError::new(e.to_string());
+    match e.line() {
+        Some(line) => error.line(line),
+        None => error,
+    }
 }
 
 #[cfg(test)]
