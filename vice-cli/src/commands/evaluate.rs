@@ -3,16 +3,17 @@
 use std::path::PathBuf;
 
 use vice_core::depth::DepthSource;
-use vice_core::evaluate::{EvaluateError, Evaluation, Observations, Selection, evaluate};
+use vice_core::evaluate::{
+    EvaluateError, Evaluation, Observations, SampleSink, Selection, evaluate, evaluate_streaming,
+};
 use vice_core::metrics::align::Alignment;
 use vice_core::result::{ResultDocument, Settings};
 
 use vice_core::dataset::{Dataset, Floor};
 
-use crate::inputs::{
-    DatasetArgs, DepthArgs, LabelArgs, Outputs, StreamArgs, load_streams, split_list, to_json,
-};
+use crate::inputs::{DatasetArgs, DepthArgs, LabelArgs, Outputs, StreamArgs, load_streams, split_list};
 use crate::report;
+use crate::report::sample_lines;
 use crate::terminal::{self, Outcome, Verbosity, usage};
 
 /// Arguments of `vice evaluate`.
@@ -60,9 +61,9 @@ struct ScoringArgs {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Output")]
 struct OutputArgs {
-    /// Which samples the JSON lists.
-    #[arg(long, value_name = "all|none", default_value = "all", value_parser = ["all", "none"])]
-    samples: String,
+    /// Where the scored samples go: into the JSON, nowhere, or one a line into a file beside it (FILE.samples.jsonl).
+    #[arg(long, value_enum, value_name = "HOW", default_value = "all")]
+    samples: Samples,
     /// Result document, vice.result/1; - prints it in place of the table.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -74,6 +75,14 @@ struct OutputArgs {
     latex: Option<PathBuf>,
 }
 
+/// What becomes of the scored samples, of which a long run has millions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Samples {
+    All,
+    None,
+    Jsonl,
+}
+
 fn percent(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.0..=100.0).contains(&value) => Ok(value),
@@ -83,14 +92,13 @@ fn percent(text: &str) -> Result<f64, String> {
 
 pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
     let outputs = Outputs::new(&[&args.output.json, &args.output.csv, &args.output.latex], &inputs(args))?;
-    let document = document(args, verbosity)?;
-    // All texts are made before the first is written, so that a failure leaves nothing half done.
-    let json = args
-        .output
-        .json
-        .as_ref()
-        .map(|path| Ok::<_, anyhow::Error>((path, to_json(&document)?)))
-        .transpose()?;
+    let samples = samples_file(args)?;
+    let document = match &samples {
+        Some(path) => sample_lines::write(path, |sink| document(args, verbosity, Some(sink)))?,
+        None => document(args, verbosity, None)?,
+    };
+    // All texts are made before the first is written, so that a failure leaves nothing half done. The JSON may be too
+    // large to be one.
     let csv =
         args.output.csv.as_ref().map(|path| report::csv::render(&document).map(|t| (path, t))).transpose()?;
     let latex = args
@@ -99,8 +107,10 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         .as_ref()
         .map(|path| report::latex::render(&document).map(|t| (path, t)))
         .transpose()?;
-    let texts: Vec<(&PathBuf, String)> = [json, csv, latex].into_iter().flatten().collect();
-    if !outputs.write(&texts)? {
+    let texts: Vec<(&PathBuf, String)> = [csv, latex].into_iter().flatten().collect();
+    let json_printed =
+        args.output.json.as_ref().map_or(Ok(false), |path| outputs.write_json(path, &document))?;
+    if !(outputs.write(&texts)? || json_printed) {
         terminal::print(&report::table::render(&document))?;
     }
     let worst = document.worst_skipped_percent();
@@ -114,7 +124,24 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     Ok(Outcome::Done)
 }
 
-fn document(args: &Args, verbosity: Verbosity) -> anyhow::Result<ResultDocument> {
+/// The file of samples beside the JSON, where it is asked for.
+fn samples_file(args: &Args) -> anyhow::Result<Option<PathBuf>> {
+    match (args.output.samples, &args.output.json) {
+        (Samples::Jsonl, Some(json)) if json.as_os_str() != "-" => {
+            let path = json.with_extension("samples.jsonl");
+            Outputs::new(&[&Some(path.clone()), &args.output.csv, &args.output.latex], &inputs(args))?;
+            Ok(Some(path))
+        }
+        (Samples::Jsonl, _) => Err(usage("--samples jsonl writes beside the JSON: name a file with --json")),
+        _ => Ok(None),
+    }
+}
+
+fn document(
+    args: &Args,
+    verbosity: Verbosity,
+    sink: Option<&mut SampleSink<'_>>,
+) -> anyhow::Result<ResultDocument> {
     let calibration = args.depth_options.calibration()?;
     let floor = args.depth_options.floor()?;
     let dataset = args.dataset.open()?;
@@ -178,14 +205,18 @@ fn document(args: &Args, verbosity: Verbosity) -> anyhow::Result<ResultDocument>
         max_gap: args.streams.max_gap,
         subsets: (!subsets.is_empty()).then_some(subsets.as_slice()),
         align: args.scoring.align,
-        keep_samples: args.output.samples == "all",
+        keep_samples: args.output.samples == Samples::All && args.output.json.is_some(),
         settings,
     };
     let bar = verbosity.progress("evaluating");
-    let document = evaluate(&evaluation, &|done, total| {
+    let progress = |done, total| {
         bar.set_length(total as u64);
         bar.set_position(done as u64);
-    })?;
+    };
+    let document = match sink {
+        Some(sink) => evaluate_streaming(&evaluation, &progress, sink)?,
+        None => evaluate(&evaluation, &progress)?,
+    };
     bar.finish_and_clear();
     Ok(document)
 }

@@ -1,6 +1,9 @@
 //! Files that a command writes: none of them may be what it reads, and all or none are written.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
+
+use anyhow::Context;
 
 use crate::inputs::write_text;
 use crate::terminal::{self, usage};
@@ -33,6 +36,22 @@ impl Outputs {
             seen.push(place);
         }
         Ok(Self(()))
+    }
+
+    /// Writes a document as one line of JSON without holding its text; true if it went to standard output.
+    pub(crate) fn write_json(&self, path: &Path, document: &impl serde::Serialize) -> anyhow::Result<bool> {
+        let fill = |out: &mut dyn Write| {
+            serde_json::to_writer(&mut *out, document)?;
+            out.write_all(b"\n")
+        };
+        if path == Path::new(STDOUT) {
+            let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+            fill(&mut out).and_then(|()| out.flush())?;
+            return Ok(true);
+        }
+        vice_files::atomic::write(path, vice_files::atomic::Overwrite::Replace, fill)
+            .with_context(|| format!("cannot write {}", path.display()))?;
+        Ok(false)
     }
 
     /// Writes texts; true if one went to standard output, in place of what would be printed there.

@@ -7,4 +7,5 @@ pub(crate) mod latex;
 pub(crate) mod npy;
 pub(crate) mod overlay;
 pub(crate) mod rows;
+pub(crate) mod sample_lines;
 pub(crate) mod table;
