@@ -57,6 +57,8 @@ pub(crate) enum Command {
     Labels(commands::labels::Command),
     /// Write a pose stream of a data set as a trajectory file.
     Convert(commands::convert::Args),
+    /// Measure how fast points are projected here, beside the machine's limit.
+    Bench(commands::bench::Args),
     /// Print completions for a shell.
     Completions(commands::completions::Args),
 }

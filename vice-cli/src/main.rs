@@ -35,6 +35,7 @@ fn main() -> ExitCode {
         Command::Synth(args) => commands::synth::run(args, verbosity),
         Command::Labels(args) => commands::labels::run(args, verbosity),
         Command::Convert(args) => commands::convert::run(args),
+        Command::Bench(args) => commands::bench::run(args, verbosity),
         Command::Completions(args) => commands::completions::run(args),
     };
     match outcome {

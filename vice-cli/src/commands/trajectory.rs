@@ -165,7 +165,8 @@ fn read_both(args: &Args) -> anyhow::Result<(Trajectory, Trajectory)> {
     let read = |spec: &str, index_as_seconds| {
         read_spec(spec, &ReadOptions { times: args.times.clone(), index_as_seconds })
     };
-    let (mut reference, mut estimate) = (read(&args.reference, true)?, read(&args.estimate, true)?);
+    let (reference, estimate) = rayon::join(|| read(&args.reference, true), || read(&args.estimate, true));
+    let (mut reference, mut estimate) = (reference?, estimate?);
     match (reference.format, estimate.format) {
         (TrajectoryFormat::Kitti, TrajectoryFormat::Kitti) => {}
         (TrajectoryFormat::Kitti, _) => reference = read(&args.reference, false)?,

@@ -1,0 +1,255 @@
+//! Runs both sides.
+
+use std::error::Error;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::time::Instant;
+
+use serde_json::Value;
+use vice_core::camera::{Camera, Model};
+use vice_core::frames::{Rigid, WorldFromCamera};
+use vice_depth::{Cloud, CloudOptions, ZMapDepth, ZMapOptions, depth_image, read_ply_points};
+
+use crate::files::{Files, POSES, SCAN_POINTS};
+use crate::table::{Rounds, Side};
+
+type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
+
+/// The program `vice`.
+pub(crate) struct Ours {
+    program: PathBuf,
+}
+
+impl Ours {
+    /// Builds it in the profile and target folder of this program.
+    pub(crate) fn build() -> Result<Self> {
+        let own = std::env::current_exe()?;
+        let folder = own.parent().ok_or("this program lies nowhere")?;
+        let target = folder.parent().ok_or("this program does not lie in a target folder")?;
+        let profile = match folder.file_name().and_then(|n| n.to_str()) {
+            Some("debug") | None => "dev",
+            Some(name) => name,
+        };
+        let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+            .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(".."))
+            .args(["build", "--package", "vice-cli", "--profile", profile, "--target-dir"])
+            .arg(target)
+            .status()?;
+        if !status.success() {
+            return Err("vice could not be built".into());
+        }
+        Ok(Self { program: folder.join(format!("vice{}", std::env::consts::EXE_SUFFIX)) })
+    }
+
+    fn bench(&self, arguments: &[&str]) -> Result<Value> {
+        let output =
+            Command::new(&self.program).arg("bench").args(arguments).args(["--json", "-"]).output()?;
+        if !output.status.success() {
+            return Err(String::from_utf8_lossy(&output.stderr).into_owned().into());
+        }
+        Ok(serde_json::from_slice(&output.stdout)?)
+    }
+
+    /// Projection, undistortion and equation 1 with the lens of EuRoC, one thread and two.
+    pub(crate) fn kernels(&self, points: usize, rounds: &mut Rounds) -> Result<()> {
+        let n = points.to_string();
+        let names = ["project", "unproject", "track"];
+        let arguments = ["--model", "radtan", "--points", &n];
+        for threads in ["1", "2"] {
+            let document = self.bench(&[&names[..], &arguments, &["--threads", threads]].concat())?;
+            for result in document["results"].as_array().into_iter().flatten() {
+                let name = result["kernel"].as_str().unwrap_or_default();
+                let per_second = result["points_per_second"].as_f64().unwrap_or(f64::NAN);
+                let side = if threads == "1" { Side::Ours } else { Side::TwoThreads };
+                rounds.add(side, name, points, points as f64 / per_second);
+                if threads == "1" {
+                    rounds.limit(name, result["fraction_of_limit"].as_f64().unwrap_or(f64::NAN));
+                }
+            }
+            rounds.machine(&document["machine"][0]);
+        }
+        // OpenCV's projection moves the points too, which is one more kernel here, timed in this process.
+        let seconds = vice_benches::in_one_thread(|| vice_benches::project_moved_seconds(points))?;
+        rounds.add(Side::Ours, "project moved", points, seconds);
+        Ok(())
+    }
+
+    /// The cost of a point from what fits the caches to what does not.
+    pub(crate) fn sizes(&self, rounds: &mut Rounds) -> Result<()> {
+        for points in [100_000, 1_000_000, 10_000_000] {
+            let n = points.to_string();
+            let names = ["project", "unproject", "track"];
+            let arguments = ["--model", "radtan", "--threads", "1", "--points", &n];
+            let document = self.bench(&[&names[..], &arguments].concat())?;
+            for result in document["results"].as_array().into_iter().flatten() {
+                let name = result["kernel"].as_str().unwrap_or_default();
+                let per_second = result["points_per_second"].as_f64().unwrap_or(f64::NAN);
+                rounds.size(name, points, 1e9 / per_second);
+            }
+        }
+        Ok(())
+    }
+
+    /// Reading a scan, and a whole depth image of it without the test for occlusion, which SciPy has not.
+    pub(crate) fn depth(&self, files: &Files, rounds: &mut Rounds) -> Result<()> {
+        let camera = Camera::new(752, 480, [458.654, 457.296, 367.215, 248.375], Model::Pinhole)?;
+        let (ply, zmap) = vice_benches::in_one_thread(|| -> Result<(f64, f64)> {
+            let options = CloudOptions::default();
+            let ply = best(3, || Ok(read_ply_points(&files.scan, &options).map(drop)?))?;
+            let cloud = Arc::new(Cloud::read_ply(&files.scan, &options)?);
+            let keyframe = vice_benches::keyframe(&camera, WorldFromCamera::identity());
+            let without = ZMapOptions { occlusion: false, ..ZMapOptions::default() };
+            let source = ZMapDepth::new(cloud, Rigid::identity(), without);
+            let zmap = best(3, || Ok(depth_image(&source, &keyframe).map(drop)?))?;
+            Ok((ply, zmap))
+        })??;
+        rounds.add(Side::Ours, "ply", SCAN_POINTS, ply);
+        rounds.add(Side::Ours, "zmap", SCAN_POINTS, zmap);
+        Ok(())
+    }
+
+    /// The whole command, process start and reading included.
+    pub(crate) fn trajectory(&self, files: &Files, rounds: &mut Rounds) -> Result<()> {
+        let seconds = best(3, || {
+            run(Command::new(&self.program)
+                .arg("trajectory")
+                .args([&files.reference, &files.estimate])
+                .args(["--align", "se3"]))
+        })?;
+        rounds.add(Side::Ours, "trajectory", POSES, seconds);
+        Ok(())
+    }
+}
+
+/// What a user would pick instead.
+pub(crate) struct Peers {
+    cpp: Option<PathBuf>,
+    python: Option<OsString>,
+    evo: Option<PathBuf>,
+    pub(crate) missing: Vec<String>,
+}
+
+impl Peers {
+    pub(crate) fn find(folder: &Path) -> Self {
+        let mut missing = Vec::new();
+        let cpp = compile(folder).map_err(|e| missing.push(format!("OpenCV from C++: {e}"))).ok();
+        let python = std::env::var_os("VICE_PEERS_PYTHON").unwrap_or_else(|| "python3".into());
+        let python = match run(python_command(&python).args(["-c", "import numpy, cv2"])) {
+            Ok(()) => Some(python),
+            Err(error) => {
+                missing.push(format!("Python with opencv-python-headless and numpy: {error}"));
+                None
+            }
+        };
+        let evo = python.as_ref().and_then(|p| {
+            let beside = Path::new(p).with_file_name("evo_ape");
+            if beside.is_file() {
+                return Some(beside);
+            }
+            missing.push("evo: there is no evo_ape beside the Python (VICE_PEERS_PYTHON)".to_string());
+            None
+        });
+        for module in ["scipy", "plyfile"] {
+            if let Some(python) = &python
+                && run(python_command(python).args(["-c", &format!("import {module}")])).is_err()
+            {
+                missing.push(format!("{module}: the Python cannot import it"));
+            }
+        }
+        Self { cpp, python, evo, missing }
+    }
+
+    pub(crate) fn cpp(&self, points: usize, rounds: &mut Rounds) -> Result<()> {
+        let Some(program) = &self.cpp else { return Ok(()) };
+        lines(Command::new(program).arg(points.to_string()), Side::Cpp, rounds)
+    }
+
+    pub(crate) fn python(&self, points: usize, files: &Files, rounds: &mut Rounds) -> Result<()> {
+        let Some(python) = &self.python else { return Ok(()) };
+        let mut command = python_command(python);
+        command.args(["-c", include_str!("../../../peers/peers.py"), &points.to_string()]);
+        lines(command.args([&files.scan, &files.reference, &files.estimate]), Side::Python, rounds)
+    }
+
+    /// The whole command, process start and reading included.
+    pub(crate) fn evo(&self, files: &Files, rounds: &mut Rounds) -> Result<()> {
+        let Some(evo) = &self.evo else { return Ok(()) };
+        let seconds = best(1, || {
+            let mut command = python_command(evo.as_os_str());
+            run(command.arg("tum").args([&files.reference, &files.estimate]).arg("--align"))
+        })?;
+        rounds.add(Side::Python, "trajectory", POSES, seconds);
+        Ok(())
+    }
+}
+
+/// A Python program in one thread. Settings that bind its libraries to a processor of another kind are taken off.
+fn python_command(program: &std::ffi::OsStr) -> Command {
+    let mut command = Command::new(program);
+    command.env_remove("OPENBLAS_CORETYPE").env_remove("OPENBLAS_L2_SIZE");
+    command.env("OPENBLAS_NUM_THREADS", "1").env("OMP_NUM_THREADS", "1");
+    command
+}
+
+fn compile(folder: &Path) -> Result<PathBuf> {
+    let (source, program) = (folder.join("opencv.cpp"), folder.join("opencv-peer"));
+    std::fs::write(&source, include_str!("../../../peers/opencv.cpp"))?;
+    let flags = Command::new("pkg-config").args(["--cflags", "opencv4"]).output();
+    let flags = flags.map_or_else(
+        |_| "-I/usr/include/opencv4".into(),
+        |o| String::from_utf8_lossy(&o.stdout).into_owned(),
+    );
+    let compiler = std::env::var_os("CXX").unwrap_or_else(|| "c++".into());
+    run(Command::new(compiler)
+        .args(["-O3", "-march=native", "-std=c++17"])
+        .args(flags.split_whitespace())
+        .arg(&source)
+        .arg("-o")
+        .arg(&program)
+        .args(
+            ["opencv_calib3d", "opencv_video", "opencv_imgproc", "opencv_core"].map(|l| format!("-l{l}")),
+        ))?;
+    Ok(program)
+}
+
+/// Runs a program that must succeed; its last line is why where it does not.
+fn run(command: &mut Command) -> Result<()> {
+    let name = Path::new(command.get_program()).display().to_string();
+    let output = command.stdin(Stdio::null()).output().map_err(|e| format!("{name}: {e}"))?;
+    if output.status.success() {
+        return Ok(());
+    }
+    let errors = String::from_utf8_lossy(&output.stderr);
+    let last = errors.lines().rfind(|l| l.contains("rror")).or_else(|| errors.lines().last());
+    Err(format!("{name}: {}", last.unwrap_or("failed")).into())
+}
+
+/// The cases that a peer prints.
+fn lines(command: &mut Command, side: Side, rounds: &mut Rounds) -> Result<()> {
+    let output = command.stdin(Stdio::null()).output()?;
+    if !output.status.success() {
+        return Err(String::from_utf8_lossy(&output.stderr).into_owned().into());
+    }
+    for line in String::from_utf8(output.stdout)?.lines() {
+        let case: Value = serde_json::from_str(line)?;
+        if let (Some(name), Some(n), Some(seconds)) =
+            (case["name"].as_str(), case["n"].as_u64(), case["seconds"].as_f64())
+        {
+            rounds.add(side, name, usize::try_from(n)?, seconds);
+        }
+    }
+    Ok(())
+}
+
+fn best(runs: usize, mut work: impl FnMut() -> Result<()>) -> Result<f64> {
+    work()?;
+    let mut best = f64::INFINITY;
+    for _ in 0..runs {
+        let start = Instant::now();
+        work()?;
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    Ok(best)
+}

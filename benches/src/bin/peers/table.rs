@@ -1,0 +1,260 @@
+//! Times by round, and their ratios as a table.
+
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde_json::Value;
+
+/// Who was timed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Side {
+    Ours,
+    TwoThreads,
+    Cpp,
+    Python,
+}
+
+/// A row of the table: a case of ours against one of theirs, and the ratio that is asked for.
+struct Row {
+    case: &'static str,
+    ours: (Side, &'static str),
+    theirs: (Side, &'static str),
+    what: &'static str,
+    goal: Option<f64>,
+}
+
+const fn row(
+    case: &'static str,
+    ours: &'static str,
+    theirs: (Side, &'static str),
+    what: &'static str,
+    goal: Option<f64>,
+) -> Row {
+    Row { case, ours: (Side::Ours, ours), theirs, what, goal }
+}
+
+const ROWS: [Row; 11] = [
+    row(
+        "project, radtan",
+        "project",
+        (Side::Cpp, "project"),
+        "C++ `cv::projectPoints`, no Jacobian",
+        Some(12.0),
+    ),
+    row(
+        "move and project, radtan",
+        "project moved",
+        (Side::Cpp, "project moved"),
+        "the same with a rotation",
+        Some(12.0),
+    ),
+    row(
+        "move and project, radtan",
+        "project moved",
+        (Side::Python, "project moved"),
+        "Python `cv2.projectPoints`",
+        None,
+    ),
+    row(
+        "unproject, radtan, 1e-10",
+        "unproject",
+        (Side::Cpp, "unproject"),
+        "C++ `cv::undistortPoints`, 1e-10",
+        Some(30.0),
+    ),
+    row(
+        "unproject, radtan, 1e-10",
+        "unproject",
+        (Side::Python, "unproject"),
+        "Python `cv2.undistortPoints`, 1e-10",
+        None,
+    ),
+    row("equation 1, radtan", "track", (Side::Cpp, "track"), "C++ OpenCV, both and a loop", None),
+    row("equation 1, radtan", "track", (Side::Python, "track"), "OpenCV with NumPy", Some(40.0)),
+    row(
+        "`vice trajectory --align se3`",
+        "trajectory",
+        (Side::Python, "trajectory"),
+        "`evo_ape tum --align`",
+        Some(20.0),
+    ),
+    row(
+        "`vice trajectory --align se3`",
+        "trajectory",
+        (Side::Python, "trajectory in process"),
+        "evo's functions, imports not counted",
+        None,
+    ),
+    row("whole depth image of a scan", "zmap", (Side::Python, "zmap"), "SciPy `LinearNDInterpolator`", None),
+    row("reading a binary PLY", "ply", (Side::Python, "ply"), "plyfile", None),
+];
+
+/// Points of a case and its time in each round.
+type Times = BTreeMap<(Side, String), (usize, Vec<Option<f64>>)>;
+
+/// All that was measured.
+#[derive(Default)]
+pub(crate) struct Rounds {
+    count: usize,
+    times: Times,
+    limits: BTreeMap<String, Vec<f64>>,
+    sizes: BTreeMap<String, BTreeMap<usize, f64>>,
+    machines: BTreeMap<u64, [f64; 3]>,
+}
+
+impl Rounds {
+    pub(crate) fn start(&mut self) {
+        self.count += 1;
+    }
+
+    /// The time of a case in this round.
+    pub(crate) fn add(&mut self, side: Side, name: &str, n: usize, seconds: f64) {
+        let (points, times) = self.times.entry((side, name.to_string())).or_default();
+        *points = n;
+        times.resize(self.count, None);
+        times[self.count - 1] = Some(seconds);
+    }
+
+    /// How near a kernel of ours comes to the machine's limit.
+    pub(crate) fn limit(&mut self, name: &str, fraction: f64) {
+        self.limits.entry(name.to_string()).or_default().push(fraction);
+    }
+
+    /// The best cost of a point at a size, nanoseconds.
+    pub(crate) fn size(&mut self, name: &str, points: usize, nanoseconds: f64) {
+        let best = self.sizes.entry(name.to_string()).or_default().entry(points).or_insert(f64::INFINITY);
+        *best = best.min(nanoseconds);
+    }
+
+    /// The machine's limits with a number of threads; the best of the rounds.
+    pub(crate) fn machine(&mut self, machine: &Value) {
+        let Some(threads) = machine["threads"].as_u64() else { return };
+        let best = self.machines.entry(threads).or_default();
+        let names = ["memcpy_bytes_per_second", "multiply_adds_per_second", "divisions_per_second"];
+        for (best, name) in best.iter_mut().zip(names) {
+            *best = best.max(machine[name].as_f64().unwrap_or(0.0));
+        }
+    }
+
+    fn ratios(&self, theirs: (Side, &str), ours: (Side, &str)) -> Vec<f64> {
+        let get = |(side, name): (Side, &str)| self.times.get(&(side, name.to_string()));
+        let (Some((n, theirs)), Some((m, ours))) = (get(theirs), get(ours)) else { return vec![] };
+        let mut ratios: Vec<f64> = theirs
+            .iter()
+            .zip(ours)
+            .filter_map(|(t, o)| Some(((*t)? / *n as f64) / ((*o)? / *m as f64)))
+            .collect();
+        ratios.sort_by(f64::total_cmp);
+        ratios
+    }
+
+    /// The best time of a point, nanoseconds.
+    fn best_ns(&self, side: Side, name: &str) -> Option<f64> {
+        let (n, times) = self.times.get(&(side, name.to_string()))?;
+        let best = times.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+        Some(best * 1e9 / *n as f64)
+    }
+
+    /// The tables, in Markdown.
+    pub(crate) fn render(&self, points: usize, missing: &[String]) -> String {
+        let mut text = format!(
+            "{} rounds of {points} points; times are of one point or pose in one thread, the best of all rounds; ratios are \
+             taken within a round: median (least to largest). Instructions: {}.\n\n",
+            self.count,
+            vice_core::lanes::instruction_set()
+        );
+        text.push_str("| case | ours ns | peer | peer ns | times faster | asked |\n| --- | --- | --- | --- | --- | --- |\n");
+        for row in &ROWS {
+            let ratios = self.ratios(row.theirs, row.ours);
+            if ratios.is_empty() {
+                continue;
+            }
+            let ns = |(side, name)| self.best_ns(side, name).map_or_else(String::new, significant);
+            let _ = writeln!(
+                text,
+                "| {} | {} | {} | {} | {} | {} |",
+                row.case,
+                ns(row.ours),
+                row.what,
+                ns(row.theirs),
+                spread(&ratios),
+                row.goal.map_or_else(String::new, |g| g.to_string()),
+            );
+        }
+        text.push_str("\n| kernel | part of the machine's limit | two threads against one (asked 1.8) | ns a point at 1e5, 1e6, 1e7 | dearest by cheapest (asked 1.5) |\n| --- | --- | --- | --- | --- |\n");
+        for (name, fractions) in &self.limits {
+            let mut fractions = fractions.clone();
+            fractions.sort_by(f64::total_cmp);
+            let sizes: Vec<f64> =
+                self.sizes.get(name).into_iter().flat_map(|s| s.values().copied()).collect();
+            let (least, most) =
+                sizes.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), v| (a.min(*v), b.max(*v)));
+            let listed: Vec<String> = sizes.iter().map(|v| significant(*v)).collect();
+            let _ = writeln!(
+                text,
+                "| {name} | {} | {} | {} | {:.2} |",
+                spread(&fractions),
+                spread(&self.ratios((Side::Ours, name), (Side::TwoThreads, name))),
+                listed.join(", "),
+                most / least,
+            );
+        }
+        if let Some(ns) = self.best_ns(Side::Cpp, "pyrlk") {
+            let _ = writeln!(
+                text,
+                "\n`cv::calcOpticalFlowPyrLK` (21x21, three levels more): {:.1} µs a corner.",
+                ns / 1e3
+            );
+        }
+        text.push('\n');
+        for (threads, [copy, sums, divisions]) in &self.machines {
+            let _ = writeln!(
+                text,
+                "- {threads} thread{}: memcpy {:.1} GB/s (read and written), {:.1}e9 multiply-adds/s, {:.2}e9 divisions/s",
+                if *threads == 1 { "" } else { "s" },
+                copy / 1e9,
+                sums / 1e9,
+                divisions / 1e9
+            );
+        }
+        for missing in missing {
+            let _ = writeln!(text, "- missing: {missing}");
+        }
+        text
+    }
+}
+
+fn significant(value: f64) -> String {
+    if value < 10.0 {
+        format!("{value:.2}")
+    } else if value < 100.0 {
+        format!("{value:.1}")
+    } else {
+        format!("{value:.0}")
+    }
+}
+
+/// The median of sorted values, and their range.
+fn spread(sorted: &[f64]) -> String {
+    match (sorted.first(), sorted.last()) {
+        (Some(least), Some(most)) => {
+            let middle = sorted[sorted.len() / 2];
+            format!("{} ({} to {})", significant(middle), significant(*least), significant(*most))
+        }
+        _ => String::new(),
+    }
+}
+
+const BEGIN: &str = "<!-- peers: begin -->\n";
+const END: &str = "<!-- peers: end -->\n";
+
+/// Puts the tables between the markers of a page.
+pub(crate) fn replace(path: &Path, text: &str) -> Result<(), Box<dyn Error + Send + Sync>> {
+    let page = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let parts = page.split_once(BEGIN).and_then(|(before, rest)| Some((before, rest.split_once(END)?.1)));
+    let (before, after) = parts.ok_or_else(|| format!("{}: the markers are missing", path.display()))?;
+    std::fs::write(path, format!("{before}{BEGIN}{text}{END}{after}"))?;
+    Ok(())
+}
