@@ -64,7 +64,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         let bytes = draw(&flight, &document)?;
         vice_files::atomic::write(&picture, vice_files::atomic::Overwrite::Replace, |w| w.write_all(&bytes))?;
         // Read back what was rendered: to render it again would take as long as all the rest.
-        let written = crate::formats::registry().open(out, Some("euroc"), &OpenOptions::default())?;
+        let written = crate::formats::built_in().open(out, Some("euroc"), &OpenOptions::default())?;
         let shots = with_progress(&document, written.as_ref(), IMAGE_BUDGET_BYTES, verbosity);
         // What other commands find, such as a diagnosis of each estimate, goes into `run.more`.
         let run = Run::new(document, shots);

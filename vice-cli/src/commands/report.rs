@@ -6,7 +6,7 @@ use std::sync::Arc;
 use vice_core::dataset::Dataset;
 use vice_core::result::ResultDocument;
 
-use crate::formats;
+use crate::formats::{self, PluginArgs};
 use crate::inputs::{DatasetArgs, Outputs};
 use crate::report::frames::Shots;
 use crate::report::html::{IMAGE_BUDGET_BYTES, Run, render};
@@ -29,6 +29,8 @@ pub(crate) struct Args {
     /// Where the data set is now.
     #[arg(long, value_name = "DIR")]
     dataset: Option<PathBuf>,
+    #[command(flatten)]
+    plugins: PluginArgs,
 }
 
 pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
@@ -47,7 +49,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         .into_iter()
         .zip(&args.results)
         .map(|(document, path)| {
-            let shots = match open(&document, args.dataset.as_ref()) {
+            let shots = match open(&document, args.dataset.as_ref(), &args.plugins) {
                 Ok(dataset) => with_progress(&document, dataset.as_ref(), budget, verbosity),
                 Err(error) => Shots::missing(format!("{error:#}; --dataset DIR says where the data set is")),
             };
@@ -83,17 +85,22 @@ pub(crate) fn with_progress(
 }
 
 /// Opens the data set that a document names, or the folder it moved to, with the settings it was opened with.
-fn open(document: &ResultDocument, moved: Option<&PathBuf>) -> anyhow::Result<Arc<dyn Dataset>> {
+fn open(
+    document: &ResultDocument,
+    moved: Option<&PathBuf>,
+    plugins: &PluginArgs,
+) -> anyhow::Result<Arc<dyn Dataset>> {
     let settings = &document.settings;
     let path = moved.cloned().or_else(|| settings.dataset.as_ref().map(PathBuf::from));
     let path = path.ok_or_else(|| anyhow::anyhow!("the result does not say where its data set is"))?;
-    let known = formats::registry().by_name(&document.dataset.format).is_ok();
+    let known = formats::registry(plugins)?.by_name(&document.dataset.format).is_ok();
     let set = |(key, value): (&String, &String)| Some((key.strip_prefix("set ")?.to_string(), value.clone()));
     let args = DatasetArgs {
         path,
         format: known.then(|| document.dataset.format.clone()),
         settings: settings.other.iter().filter_map(set).collect(),
         camera: None,
+        plugins: plugins.clone(),
     };
     args.open()
 }

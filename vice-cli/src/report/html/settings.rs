@@ -56,7 +56,7 @@ fn command(document: &ResultDocument) -> Option<String> {
     let mut words: Vec<String> = vec!["vice".to_string(), "evaluate".to_string(), s.dataset.clone()?];
     let mut option = |name: &str, value: &str| words.extend([format!("--{name}"), value.to_string()]);
     // A flight that was never a file has a format that no file has.
-    if crate::formats::registry().by_name(&document.dataset.format).is_ok() {
+    if document.dataset.format != "synthetic" {
         option("format", &document.dataset.format);
     }
     option("camera", &document.dataset.camera);
