@@ -34,7 +34,8 @@ impl Hostile {
 
     pub(crate) fn check(&self, more: &[&str]) -> Run {
         let (library, data) = (self.library.to_str().unwrap(), self.data());
-        vice(&[&["plugin", "check", library, text(&data), "--cycles", "3"], more].concat())
+        let few: &[&str] = if more.contains(&"--cycles") { &[] } else { &["--cycles", "3"] };
+        vice(&[&["plugin", "check", library, text(&data)], few, more].concat())
     }
 }
 

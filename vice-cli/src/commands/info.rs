@@ -21,13 +21,13 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let path = &args.dataset.path;
-    if args.dataset.format.is_none() {
-        let registry = formats::registry(&args.dataset.plugins)?;
-        if let (factory, Probe::Collection(runs)) = registry.detect(path)? {
-            return list(&factory.info().name, path, &runs);
-        }
+    let registry = formats::registry(&args.dataset.plugins)?;
+    if args.dataset.format.is_none()
+        && let (factory, Probe::Collection(runs)) = registry.detect(path)?
+    {
+        return list(&factory.info().name, path, &runs);
     }
-    let dataset = args.dataset.open()?;
+    let dataset = args.dataset.open_in(&registry)?;
     if args.dataset.camera.is_some() {
         args.dataset.camera_name(dataset.as_ref())?;
     }

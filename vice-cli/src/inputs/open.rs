@@ -6,6 +6,7 @@ use std::sync::Arc;
 use vice_core::camera::Camera;
 use vice_core::dataset::{Dataset, OpenOptions};
 use vice_core::frames::BodyFromCamera;
+use vice_core::registry::Registry;
 use vice_core::time::Stamp;
 use vice_files::calibration::CalibrationFile;
 
@@ -43,8 +44,13 @@ pub(crate) struct UsedCamera {
 
 impl DatasetArgs {
     pub(crate) fn open(&self) -> anyhow::Result<Arc<dyn Dataset>> {
+        self.open_in(&formats::registry(&self.plugins)?)
+    }
+
+    /// Opens it with formats that were loaded before.
+    pub(crate) fn open_in(&self, registry: &Registry) -> anyhow::Result<Arc<dyn Dataset>> {
         let options = OpenOptions { settings: self.settings.iter().cloned().collect() };
-        Ok(Arc::from(formats::registry(&self.plugins)?.open(&self.path, self.format.as_deref(), &options)?))
+        Ok(Arc::from(registry.open(&self.path, self.format.as_deref(), &options)?))
     }
 
     /// The name of the camera that was asked for, or the first.

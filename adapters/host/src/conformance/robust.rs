@@ -13,6 +13,9 @@ use super::{Check, Lists, spread};
 /// Growth of memory that may be the allocator's, bytes.
 const NOISE_BYTES: u64 = 8 << 20;
 
+/// With fewer cycles nothing can be said about growth.
+const CYCLES_THAT_TELL: u64 = 100;
+
 impl Check<'_> {
     /// Names that are not there are errors, and change nothing.
     pub(super) fn unknown_names(&mut self, dataset: &dyn Dataset, lists: &Lists) {
@@ -93,11 +96,8 @@ impl Check<'_> {
         self.step(format!("opening and closing {cycles} times"));
         let camera = lists.cameras.first().map(|c| c.name.clone());
         let start = Instant::now();
-        // The first ones fill caches.
-        let settled = (cycles / 5).min(50);
-        let mut at_settled = None;
-        let mut done = 0;
-        let mut told = start;
+        let (mut done, mut told) = (0, start);
+        let mut levels: Vec<Level> = Vec::new();
         while done < cycles && start.elapsed() < self.thorough.cycles_within {
             let Some(dataset) = self.open_again() else { return };
             if let Some(camera) = &camera {
@@ -106,35 +106,56 @@ impl Check<'_> {
             }
             drop(dataset);
             done += 1;
-            if done == settled {
-                at_settled = Some((resident_bytes(), open_files()));
-            }
+            levels.push(Level::now());
             if told.elapsed() > Duration::from_secs(1) {
                 told = Instant::now();
                 self.step(format!("opening and closing, {done} of {cycles} times"));
             }
         }
         let slow = if done < cycles { " (it takes long, so fewer times)" } else { "" };
-        let before = self.faults;
-        if let Some((bytes, files)) = at_settled.filter(|_| done > settled) {
-            let more = u64::from(done - settled);
-            if let (Some(was), Some(is)) = (bytes, resident_bytes())
-                && is.saturating_sub(was) > NOISE_BYTES
-            {
-                let each = is.saturating_sub(was) / more;
-                self.fault(format!("memory grows by {each} bytes each time it is opened and closed"));
-            }
-            if let (Some(was), Some(is)) = (files, open_files())
-                && is >= was + more / 2
-                && is > was
-            {
-                self.fault(format!("{} files are left open after {more} times", is - was));
-            }
-        }
-        if self.faults == before {
-            self.good(format!("opened and closed {done} times, nothing is left over{slow}"));
+        match left_over(&levels) {
+            Some(what) => self.fault(what),
+            None => self.good(format!("opened and closed {done} times, nothing is left over{slow}")),
         }
     }
+}
+
+/// What this process holds after a cycle, where the system tells.
+#[derive(Clone, Copy)]
+struct Level {
+    bytes: u64,
+    files: u64,
+}
+
+impl Level {
+    fn now() -> Self {
+        let statm = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
+        let pages: u64 = statm.split_whitespace().nth(1).and_then(|p| p.parse().ok()).unwrap_or(0);
+        let files = std::fs::read_dir("/proc/self/fd").map_or(0, |entries| entries.count() as u64);
+        Self { bytes: pages * 4096, files }
+    }
+}
+
+/// What grows as long as it is opened and closed. Caches fill in the first cycles, and an allocator keeps some memory: what
+/// counts is that the second half grows as the first did.
+fn left_over(levels: &[Level]) -> Option<String> {
+    let cycles = levels.len() as u64;
+    if cycles < CYCLES_THAT_TELL {
+        return None;
+    }
+    let at = |tenth: usize| levels[(levels.len() - 1) * tenth / 10];
+    let (early, middle, late) = (at(2), at(6), at(10));
+    let grows =
+        |a: u64, b: u64, c: u64, least: u64| b.saturating_sub(a) >= least && c.saturating_sub(b) >= least;
+    let between = (cycles * 8 / 10).max(1);
+    if grows(early.files, middle.files, late.files, cycles / 10) {
+        return Some(format!("{} files are left open after {between} times", late.files - early.files));
+    }
+    if grows(early.bytes, middle.bytes, late.bytes, NOISE_BYTES) {
+        let each = (late.bytes - early.bytes) / between;
+        return Some(format!("memory grows by {each} bytes each time it is opened and closed"));
+    }
+    None
 }
 
 /// One number for what is read: lists, a few images, trajectories. `turn` changes the order in which it is read.
@@ -176,14 +197,21 @@ fn add<T>(hasher: &mut DefaultHasher, read: DataResult<T>, hash: impl FnOnce(&mu
     }
 }
 
-/// Memory of this process, where the system tells.
-fn resident_bytes() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/self/statm").ok()?;
-    let pages: u64 = text.split_whitespace().nth(1)?.parse().ok()?;
-    Some(pages * 4096)
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Open files of this process, where the system tells.
-fn open_files() -> Option<u64> {
-    Some(std::fs::read_dir("/proc/self/fd").ok()?.count() as u64)
+    fn levels(bytes: impl Fn(u64) -> u64, files: impl Fn(u64) -> u64) -> Vec<Level> {
+        (0..1000).map(|i| Level { bytes: bytes(i), files: files(i) }).collect()
+    }
+
+    #[test]
+    fn what_grows_steadily_is_left_over() {
+        assert_eq!(left_over(&levels(|_| 50 << 20, |_| 9)), None);
+        // A cache that fills once, and an allocator that keeps a peak.
+        assert_eq!(left_over(&levels(|i| (i.min(300)) << 20, |_| 9)), None);
+        assert!(left_over(&levels(|i| i * 100_000, |_| 9)).unwrap().contains("memory grows by"));
+        assert!(left_over(&levels(|_| 0, |i| 9 + i)).unwrap().contains("files are left open"));
+        assert_eq!(left_over(&levels(|i| i << 20, |i| i)[..50]), None);
+    }
 }
