@@ -1,5 +1,6 @@
 //! The tracker: 200 corners of a real pair of frames from images to points;
 //! a frame of one point with its template; suggested points. OpenCV's time: `tests/oracles/klt.py --time`.
+#![allow(clippy::unwrap_used)] // A benchmark that cannot run fails.
 
 use std::hint::black_box;
 use std::sync::Arc;

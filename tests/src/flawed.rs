@@ -253,7 +253,7 @@ fn labels(room: &Room, frames: &[Stamp], rng: &mut Rng) -> LabelSet {
             let last = (frame + (LONGEST_SEGMENT_S * FRAME_HZ) as usize).min(frames.len());
             let seen = |i: usize| camera.project(&at(i).inverse().transform_point(&p)).ok();
             let mut end = frame;
-            for i in frame..last {
+            for (i, stamp) in frames.iter().enumerate().take(last).skip(frame) {
                 let Some(true_px) = seen(i) else { break };
                 let off = match rng.uniform(0.0, OUTLIER_EVERY) < 1.0 {
                     true => {
@@ -266,7 +266,7 @@ fn labels(room: &Room, frames: &[Stamp], rng: &mut Rng) -> LabelSet {
                 if !camera.contains(px) {
                     break;
                 }
-                let observation = Observation::manual(frames[i], px);
+                let observation = Observation::manual(*stamp, px);
                 let observation = if i == frame { observation.as_keyframe() } else { observation };
                 rows.push(LabelRow { point: point.to_string(), observation });
                 end = i;

@@ -415,7 +415,7 @@ impl Dataset for PluginDataset {
             |out, message| unsafe { call(self.handle.raw(), place, index, out, message) },
             |depth: &contract::DepthImage| {
                 let size = (depth.width_px, depth.height_px);
-                if depth.row_stride_bytes % 4 != 0 {
+                if !depth.row_stride_bytes.is_multiple_of(4) {
                     return Err(format!("the stride {} is no multiple of 4", depth.row_stride_bytes));
                 }
                 let rows = values::Rows::new(size, 4, depth.row_stride_bytes, depth.data_bytes)?;

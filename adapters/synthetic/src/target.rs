@@ -61,7 +61,7 @@ impl Target {
         cell_m: f64,
         camera_from_target: Isometry3<f64>,
     ) -> DataResult<Self> {
-        if columns == 0 || white.is_empty() || white.len() % columns != 0 {
+        if columns == 0 || white.is_empty() || !white.len().is_multiple_of(columns) {
             return Err(DataError::new(format!("{} cells are no rows of {columns}", white.len())));
         }
         if !(cell_m > 0.0 && cell_m.is_finite()) {

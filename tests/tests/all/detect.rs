@@ -5,7 +5,7 @@ use std::fs;
 
 use serde_json::Value;
 use vice_core::camera::Pixel;
-use vice_core::dataset::{Dataset, DatasetFactory, OpenOptions};
+use vice_core::dataset::{DatasetFactory, OpenOptions};
 use vice_core::label::{LabelSet, ObservationSource};
 use vice_core::time::Stamp;
 use vice_detect::{BoardSize, DetectOptions, Detection, TagFamily, TagOptions, detect_labels};

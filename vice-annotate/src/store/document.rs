@@ -103,13 +103,13 @@ impl Document {
     ///
     /// # Errors
     /// The first cell whose `before` is not what is there: the cells belong to other labels.
-    pub fn apply(&mut self, cells: &[Cell]) -> Result<(), Cell> {
+    pub fn apply(&mut self, cells: &[Cell]) -> Result<(), Box<Cell>> {
         for (done, cell) in cells.iter().enumerate() {
             if self.get(&cell.point, cell.stamp) != cell.before.as_ref() {
                 for undone in cells[..done].iter().rev() {
                     self.put(&undone.point, undone.stamp, undone.before);
                 }
-                return Err(cell.clone());
+                return Err(Box::new(cell.clone()));
             }
             self.put(&cell.point, cell.stamp, cell.after);
         }

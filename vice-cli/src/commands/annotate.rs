@@ -86,7 +86,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         )));
     }
     let frames = Arc::clone(&used.frames);
-    let (camera_name, camera) = (used.name.clone(), used.camera.clone());
+    let (camera_name, camera) = (used.name.clone(), used.camera);
     let target = Target { dataset: dataset.name(), camera: &camera_name, frames: &frames };
     let store = Store::open(&args.labels, &target)?;
     if let Some(reason) = store.read_only() {

@@ -304,7 +304,7 @@ proptest! {
         let labels = LabelSet::from_rows(rows).unwrap();
         let frames: Vec<Stamp> = (0..50).map(|at| Stamp::from_nanos(1_403_715_273_262_142_976 + at)).collect();
         let mut bytes = Vec::new();
-        write_cvat(&mut bytes, &labels, &frames, (752, 480)).unwrap();
+        write_cvat(&mut bytes, &labels, &frames).unwrap();
         let again = read_cvat(&bytes, &frames).unwrap();
         let near = |a: &Observation, b: &Observation| {
             a.px.distance_px(b.px) < 1e-9 && Observation { px: b.px, ..*a } == *b

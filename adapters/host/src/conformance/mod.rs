@@ -93,7 +93,7 @@ pub fn check(subject: &Subject<'_>, thorough: &Thoroughness, tell: &mut dyn FnMu
         check.unknown_names(dataset.as_ref(), &lists);
         check.odd_stamps(dataset.as_ref(), &lists);
         check.several_at_once(dataset.as_ref(), &lists);
-        check.from_threads(dataset.as_ref(), &lists);
+        check.read_from_threads(dataset.as_ref(), &lists);
         drop(dataset);
         if let Some(plugin) = subject.plugin {
             check.raw_calls(plugin, &lists);

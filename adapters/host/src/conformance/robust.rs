@@ -72,7 +72,7 @@ impl Check<'_> {
         }
     }
 
-    pub(super) fn from_threads(&mut self, dataset: &dyn Dataset, lists: &Lists) {
+    pub(super) fn read_from_threads(&mut self, dataset: &dyn Dataset, lists: &Lists) {
         let threads = self.thorough.threads.max(2);
         self.step(format!("reading from {threads} threads"));
         let want = fingerprint(dataset, lists, 0);

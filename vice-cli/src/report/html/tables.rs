@@ -97,8 +97,10 @@ pub(crate) fn scored(document: &ResultDocument) -> Markup {
 
 /// Labels that could not be scored, by reason.
 pub(crate) fn skips(document: &ResultDocument) -> Markup {
-    // By reason, stream and depth: how many, of which points, from when on.
-    let mut groups: BTreeMap<(&str, &str, &str), (usize, Vec<&str>, i64)> = BTreeMap::new();
+    /// How many, of which points, from when on.
+    type Group<'a> = (usize, Vec<&'a str>, i64);
+    // By reason, stream and depth.
+    let mut groups: BTreeMap<(&str, &str, &str), Group<'_>> = BTreeMap::new();
     for part in &document.pixel {
         for skip in &part.skipped {
             let key = (skip.reason.as_str(), part.stream.as_str(), part.depth.as_str());
