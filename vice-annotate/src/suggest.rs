@@ -2,12 +2,14 @@
 
 use vice_core::camera::Pixel;
 
-use crate::tracker::{Corner, Pyramid, corners};
+use crate::tracker::{Corner, Pyramid, corners, lookalike};
 
 /// Corners with a smaller share than this of the best one's score are no suggestions.
 const MIN_SHARE: f64 = 0.15;
 /// Gray levels a pixel under which a corner is noise.
 const MIN_SCORE: f64 = 2.0;
+/// A place of which another one beside it looks this much alike (correlation) is no suggestion.
+const MAX_LOOKALIKE: f64 = 0.75;
 /// Of so many candidates, best first, suggestions are chosen.
 const MAX_CANDIDATES: usize = 4000;
 
@@ -42,7 +44,8 @@ impl Default for SuggestOptions<'_> {
 
 /// At most `count` points to label, the best choice first; fewer where the image has no more.
 ///
-/// One after the other is chosen for its score and for its distance to those that are there already.
+/// One after the other is chosen for its score and for its distance to those that are there already. Places that are
+/// seen again beside themselves, as in bricks, are passed over.
 pub fn suggest(image: &Pyramid, count: usize, options: &SuggestOptions<'_>) -> Vec<Suggestion> {
     let mut candidates = corners(image, options.border_px);
     let best = candidates.first().map_or(0.0, |c| c.score);
@@ -64,7 +67,7 @@ pub fn suggest(image: &Pyramid, count: usize, options: &SuggestOptions<'_>) -> V
             .max_by(|a, b| worth(*a, &candidates[*a]).total_cmp(&worth(*b, &candidates[*b])));
         let Some(next) = next else { break };
         let Corner { px, score } = candidates[next];
-        if !(options.accept)(px) {
+        if lookalike(image, px) > MAX_LOOKALIKE || !(options.accept)(px) {
             apart_px[next] = 0.0;
             continue;
         }

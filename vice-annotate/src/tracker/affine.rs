@@ -51,6 +51,15 @@ pub(crate) struct Match {
     pub(crate) correlation: f64,
 }
 
+/// Why there is no match.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NoMatch {
+    /// The template reaches over the border of the image.
+    Outside,
+    /// The search ran away, or there is nothing to match.
+    Lost,
+}
+
 /// The surroundings of a point in one frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Template {
@@ -127,14 +136,18 @@ impl Template {
         })
     }
 
-    /// The image's values where the template is supposed to be, normalised; none beyond the border.
-    fn seen(&self, level: &Level, warp: &Warp) -> Option<Vec<f64>> {
-        let values = offsets(REACH_PX).map(|o| sample(level, warp.place(o))).collect::<Option<_>>()?;
-        normalised(values, &self.weights).map(|(values, _)| values)
+    /// The image's values where the template is supposed to be, normalised.
+    fn seen(&self, level: &Level, warp: &Warp) -> Result<Vec<f64>, NoMatch> {
+        let values = offsets(REACH_PX).map(|o| sample(level, warp.place(o))).collect::<Option<_>>();
+        let seen = normalised(values.ok_or(NoMatch::Outside)?, &self.weights);
+        seen.map(|(values, _)| values).ok_or(NoMatch::Lost)
     }
 
-    /// Finds the template near a warp; none where it leaves the image or the search runs away.
-    pub(crate) fn find(&self, level: &Level, start: Warp) -> Option<Match> {
+    /// Finds the template near a warp.
+    ///
+    /// # Errors
+    /// [`NoMatch`] where it leaves the image or the search runs away.
+    pub(crate) fn find(&self, level: &Level, start: Warp) -> Result<Match, NoMatch> {
         let mut warp = start;
         for _ in 0..MAX_STEPS {
             let seen = self.seen(level, &warp)?;
@@ -145,13 +158,13 @@ impl Template {
             let step = self.inverse_hessian * gradient;
             let shift = Vector2::new(step[0], step[1]);
             let linear = Matrix2::new(1.0 + step[2], step[3], step[4], 1.0 + step[5]);
-            warp.linear *= linear.try_inverse()?;
+            warp.linear *= linear.try_inverse().ok_or(NoMatch::Lost)?;
             let moved = warp.linear * shift;
             warp.at = Pixel::new(warp.at.u - moved.x, warp.at.v - moved.y);
             let reach = f64::from(REACH_PX);
             let rim_px = moved.norm() + reach * (linear - Matrix2::identity()).norm();
             if !rim_px.is_finite() || rim_px > LONG_STEP_PX {
-                return None;
+                return Err(NoMatch::Lost);
             }
             if rim_px < SHORT_STEP_PX {
                 break;
@@ -159,6 +172,6 @@ impl Template {
         }
         let seen = self.seen(level, &warp)?;
         let correlation = self.values.iter().zip(&seen).zip(&self.weights).map(|((a, b), w)| a * b * w).sum();
-        Some(Match { warp, correlation })
+        Ok(Match { warp, correlation })
     }
 }

@@ -8,6 +8,7 @@
 //! | `affine` | a template that is matched with turn, scale, shear and light |
 //! | `point_track` | one point from frame to frame, with a confidence, until it is lost |
 //! | `corners` | places that can be tracked |
+//! | `lookalike` | whether a place is seen again beside itself |
 //!
 //! [`PointTrack`] is what labels are made with. [`track_translation`] is its first stage alone, for many points.
 //!
@@ -16,6 +17,7 @@
 
 mod affine;
 mod corners;
+mod lookalike;
 mod lucas_kanade;
 mod point_track;
 mod pyramid;
@@ -23,6 +25,7 @@ mod sampler;
 mod window;
 
 pub use corners::{Corner, corners};
+pub use lookalike::lookalike;
 pub use lucas_kanade::{WINDOW_PX, track_translation};
 pub use point_track::{DOUBT_CONFIDENCE, Outcome, PointTrack, Step, TrackError, TrackOptions};
 pub use pyramid::Pyramid;

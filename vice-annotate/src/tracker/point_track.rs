@@ -5,12 +5,17 @@ use std::sync::Arc;
 use nalgebra::Matrix2;
 use vice_core::camera::Pixel;
 
-use super::affine::{Match, Template, Warp};
+use super::affine::{Match, NoMatch, Template, Warp};
 use super::lucas_kanade::track_one;
 use super::pyramid::Pyramid;
 
 /// Under this confidence an observation is doubtful: a person should look at it.
 pub const DOUBT_CONFIDENCE: f64 = 0.5;
+
+/// The looks of a point are taken anew when it has become this much smaller or larger.
+const REFRESH_SCALES: [f64; 2] = [0.77, 1.3];
+/// And only where it is seen this well.
+const REFRESH_CORRELATION: f64 = 0.9;
 
 /// When tracking stops.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -159,8 +164,10 @@ impl PointTrack {
             return self.nothing(Outcome::LeftImage);
         }
         let found = self.template.find(next.base(), Warp { at: flow, ..self.warp });
-        let Some(Match { warp, correlation }) = found else {
-            return self.nothing(Outcome::Lost);
+        let Match { warp, correlation } = match found {
+            Ok(found) => found,
+            Err(NoMatch::Outside) => return self.nothing(Outcome::LeftImage),
+            Err(NoMatch::Lost) => return self.nothing(Outcome::Lost),
         };
         let jump_px = warp.at.distance_px(flow);
         let confidence = confidence(back_px, jump_px, correlation);
@@ -172,9 +179,10 @@ impl PointTrack {
         self.frame = Arc::clone(next);
         let mut outcome = Outcome::Tracked;
         let [largest, smallest] = warp.scales();
-        let changed = largest > 1.4 || smallest < 0.7 || correlation < 0.93;
-        if changed
-            && confidence > 0.6
+        // Never because it is seen less well: what comes in front of a point would become its looks bit by bit.
+        let rescaled = largest > REFRESH_SCALES[1] || smallest < REFRESH_SCALES[0];
+        if rescaled
+            && correlation > REFRESH_CORRELATION
             && let Some(template) = Template::cut(next.base(), warp.at)
         {
             self.template = template;
@@ -189,7 +197,7 @@ impl PointTrack {
 /// Falls from 1 to 0 as the way back misses, as flow and template disagree and as the template is seen less well.
 fn confidence(back_px: f64, jump_px: f64, correlation: f64) -> f64 {
     let fall = |x: f64, half: f64| 1.0 / (1.0 + (x / half).powi(4));
-    let seen = ((correlation - 0.7) / 0.2).clamp(0.0, 1.0);
+    let seen = ((correlation - 0.8) / 0.14).clamp(0.0, 1.0);
     fall(back_px, 1.0) * fall(jump_px, 1.5) * seen
 }
 
