@@ -78,3 +78,48 @@ pub fn suggest(image: &Pyramid, count: usize, options: &SuggestOptions<'_>) -> V
     }
     chosen
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use vice_core::dataset::{Image, PixelFormat};
+
+    /// Gray with bright squares of 8 pixels: four corners each.
+    fn squares(at: &[[u32; 2]]) -> Pyramid {
+        let mut gray = vec![60_u8; 320 * 240];
+        for [left, top] in at {
+            for (x, y) in (0..8).flat_map(|y| (0..8).map(move |x| (x, y))) {
+                gray[((top + y) * 320 + left + x) as usize] = 200;
+            }
+        }
+        Pyramid::new(&Image::new(320, 240, PixelFormat::Gray8, gray).unwrap(), 3).unwrap()
+    }
+
+    #[test]
+    fn suggestions_lie_on_corners_and_far_apart() {
+        let image = squares(&[[60, 60], [66, 90], [250, 60], [250, 170], [60, 170], [150, 120], [5, 5]]);
+        let found = suggest(&image, 4, &SuggestOptions::default());
+        assert_eq!(found.len(), 4);
+        for (i, a) in found.iter().enumerate() {
+            assert!(found[i + 1..].iter().all(|b| a.px.distance_px(b.px) > 80.0), "{found:?}");
+            assert!(a.px.u >= 30.0 && a.px.v >= 30.0, "{found:?}");
+        }
+        // A corner of a square lies between two pixels.
+        let corner = found.iter().find(|s| s.px.u > 200.0 && s.px.v < 100.0).unwrap();
+        let near = [249.5, 257.5].iter().any(|u| (corner.px.u - u).abs() < 2.5);
+        assert!(near, "{corner:?}");
+        let taken = [found[0].px];
+        let accept = |px: Pixel| px.u < 200.0;
+        let others =
+            suggest(&image, 9, &SuggestOptions { taken: &taken, accept: &accept, ..Default::default() });
+        assert!(!others.is_empty() && others.iter().all(|s| s.px.u < 200.0));
+        assert!(others.iter().all(|s| s.px.distance_px(taken[0]) >= 30.0));
+    }
+
+    #[test]
+    fn an_even_image_has_none() {
+        assert!(suggest(&squares(&[]), 4, &SuggestOptions::default()).is_empty());
+        let tiny = Image::new(3, 2, PixelFormat::Gray8, vec![1; 6]).unwrap();
+        assert!(suggest(&Pyramid::new(&tiny, 3).unwrap(), 4, &SuggestOptions::default()).is_empty());
+    }
+}

@@ -23,4 +23,5 @@ mod plugin_results;
 mod plugin_tum;
 mod samples;
 mod synthetic;
+mod tracker_oracle;
 mod trajectory_oracle;

@@ -22,6 +22,8 @@ mod lucas_kanade;
 mod point_track;
 mod pyramid;
 mod sampler;
+#[cfg(test)]
+mod tests;
 mod window;
 
 pub use corners::{Corner, corners};
