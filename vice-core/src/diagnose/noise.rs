@@ -17,6 +17,9 @@ const SHARED_SIGMAS: f64 = 10.0;
 const SHARING: usize = 3;
 /// Labels further than this many deviations from what their neighbours say are outliers, and weigh less.
 const OUTLIER: f64 = 3.0;
+/// Cells whose mean square is larger than this, in units of what it should be, are outliers as a whole: what a wrong key
+/// frame does turns with the camera and is no constant.
+const OUTLIER_CELL: f64 = 1.5;
 
 /// Standard deviations of one coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,7 +72,24 @@ impl Noise {
 
     /// What turns the labels of a cell into independent ones.
     pub(super) fn whitener(&self, cell: &Cell, weights: impl Fn(usize) -> f64) -> Option<Whitener> {
-        self.covariance(cell, weights).cholesky().map(Whitener)
+        self.covariance(cell, weights).cholesky().map(|factor| Whitener { factor, weight: 1.0 })
+    }
+
+    /// The same, the cell as a whole weighted by how well its residuals agree with the noise.
+    pub(super) fn robust_whitener(
+        &self,
+        cell: &Cell,
+        residuals: &[Residual],
+        weights: &[f64],
+    ) -> Option<Whitener> {
+        let mut whitener = self.whitener(cell, |i| weights[cell.labels[i]])?;
+        if cell.labels.len() >= SHARING {
+            let both = [0, 1].map(|axis| coordinate(residuals, cell, axis));
+            let squares = whitener.apply(DMatrix::from_columns(&both)).norm_squared();
+            let excess = squares / (2 * cell.labels.len()) as f64;
+            whitener.weight = (OUTLIER_CELL / excess.max(OUTLIER_CELL)).powi(2);
+        }
+        Some(whitener)
     }
 
     /// Robust weights of all labels: by how far each is from what the others of its cell predict.
@@ -89,14 +109,17 @@ impl Noise {
     }
 }
 
-/// The factor of a covariance.
-pub(super) struct Whitener(Cholesky<f64, Dyn>);
+/// The factor of a covariance, and the weight of its cell.
+pub(super) struct Whitener {
+    factor: Cholesky<f64, Dyn>,
+    weight: f64,
+}
 
 impl Whitener {
     /// Columns made independent, of unit variance.
     pub(super) fn apply(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
-        self.0.l_dirty().solve_lower_triangular_mut(&mut columns);
-        columns
+        self.factor.l_dirty().solve_lower_triangular_mut(&mut columns);
+        columns * self.weight.sqrt()
     }
 }
 

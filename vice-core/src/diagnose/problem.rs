@@ -123,16 +123,18 @@ impl<'a> Problem<'a> {
         Ok(residuals)
     }
 
-    /// Derivatives of the residuals by some parameters, by central differences: one column for each.
+    /// Derivatives of the residuals by some parameters, by central differences: one column for each. Differences wider
+    /// than the usual step see past the bumps of a depth that is not smooth.
     pub(super) fn jacobian(
         &self,
         theta: &Theta,
         parameters: &[usize],
+        wider: f64,
     ) -> Result<Vec<Vec<Residual>>, DiagnoseError> {
         parameters
             .par_iter()
             .map(|parameter| {
-                let step = PARAMETERS[*parameter].step;
+                let step = wider * PARAMETERS[*parameter].step;
                 let at = |sign: f64| {
                     let mut moved = *theta;
                     moved[*parameter] += sign * step;

@@ -12,6 +12,8 @@ use super::problem::{Problem, Residual, rmse_px};
 use super::theta::Theta;
 
 const MAX_STEPS: usize = 40;
+/// Widths of the differences, coarse to fine: a Z-map jumps from triangle to triangle as the camera is turned.
+const WIDTHS: [f64; 3] = [16.0, 4.0, 1.0];
 /// A step shorter than this share of the typical size of each parameter is the last.
 const CONVERGED: f64 = 1e-4;
 /// Clock offsets that are tried before the first step, seconds: a wrong one is a valley of its own.
@@ -93,15 +95,21 @@ impl Fit {
             ..Self::of_nothing(problem, blocks)
         };
         fit.residuals = problem.residuals(&fit.theta)?;
-        let mut damping = 1e-4;
-        for _ in 0..MAX_STEPS {
-            fit.jacobian = problem.jacobian(&fit.theta, &fit.parameters)?;
-            if !fit.step(problem, blocks, &mut damping)? {
-                break;
+        let moves_depth =
+            |flaw: &Flaw| !matches!(flaw, Flaw::ClockOffset | Flaw::InitialTilt | Flaw::Scale | Flaw::Drift);
+        let widths: &[f64] =
+            if flaws.iter().any(moves_depth) { &WIDTHS } else { &WIDTHS[WIDTHS.len() - 1..] };
+        for wider in widths {
+            let mut damping = 1e-4;
+            for _ in 0..MAX_STEPS {
+                fit.jacobian = problem.jacobian(&fit.theta, &fit.parameters, *wider)?;
+                if !fit.step(problem, blocks, &mut damping)? {
+                    break;
+                }
             }
         }
         // The last step moved the residuals away from their derivatives and pieces.
-        fit.jacobian = problem.jacobian(&fit.theta, &fit.parameters)?;
+        fit.jacobian = problem.jacobian(&fit.theta, &fit.parameters, 1.0)?;
         let whiteners = fit.reweighted(blocks);
         fit.pieces = fit.pieces_with(blocks, &whiteners);
         Ok(fit)
@@ -157,7 +165,8 @@ impl Fit {
     fn reweighted(&mut self, blocks: &Blocks) -> Vec<Option<Whitener>> {
         self.noise = Noise::of(&self.residuals, blocks);
         let weights = self.noise.weights(&self.residuals, blocks);
-        blocks.cells.iter().map(|cell| self.noise.whitener(cell, |i| weights[cell.labels[i]])).collect()
+        let whitener = |cell| self.noise.robust_whitener(cell, &self.residuals, &weights);
+        blocks.cells.iter().map(whitener).collect()
     }
 
     fn pieces_with(&self, blocks: &Blocks, whiteners: &[Option<Whitener>]) -> Vec<Normal> {
