@@ -112,7 +112,8 @@ fn copy_with(dataset: &Path, name: &str, change: impl Fn(String) -> String) -> t
 fn plugin_in_cpp_names_the_line_at_fault() {
     let Some(dataset) = shared("data/tum_rgbd5") else { return };
     let labels = dataset.join("labels.csv");
-    let cases: [(&str, &dyn Fn(String) -> String, &str); 5] = [
+    type Change<'a> = &'a dyn Fn(String) -> String;
+    let cases: [(&str, Change<'_>, &str); 5] = [
         ("rgb.txt", &|t| t.replace("1700000001.000000 ", "1.7e9 "), "rgb.txt:5: `1.7e9` is no stamp"),
         ("rgb.txt", &|t| t.replace(" rgb/", " ../"), "leads out of the data set"),
         (

@@ -153,7 +153,9 @@ fn samples_file(args: &Args) -> anyhow::Result<Option<PathBuf>> {
         return Ok(None);
     }
     if args.output.report.is_some() || args.output.rrd.is_some() {
-        return Err(usage("--samples jsonl keeps no samples that --report and --rrd could show; leave it out"));
+        return Err(usage(
+            "--samples jsonl keeps no samples that --report and --rrd could show; leave it out",
+        ));
     }
     match &args.output.json {
         Some(json) if json.as_os_str() != "-" => {

@@ -18,8 +18,8 @@ pub(crate) mod plots;
 pub(crate) mod rerun_log;
 pub(crate) mod result_file;
 pub(crate) mod rows;
-pub(crate) mod sensitivity_plot;
 pub(crate) mod sample_lines;
+pub(crate) mod sensitivity_plot;
 pub(crate) mod table;
 #[cfg(test)]
 pub(crate) mod testing;

@@ -57,7 +57,8 @@ impl<'a> Trial<'a> {
         depths: &TrialDepths,
     ) -> Vec<Sample> {
         // Only a sink can fail, and there is none.
-        score(&self.with(camera), cameras, poses, &depths.0, None).map_or_else(|_| Vec::new(), |all| all.samples)
+        score(&self.with(camera), cameras, poses, &depths.0, None)
+            .map_or_else(|_| Vec::new(), |all| all.samples)
     }
 
     fn with<'b>(&'b self, camera: &'b Camera) -> Evaluation<'b> {
