@@ -7,6 +7,7 @@ use std::sync::Arc;
 use anyhow::Context;
 use vice_core::dataset::{Dataset, GROUND_TRUTH, OpenOptions};
 use vice_core::depth::DepthSource;
+use vice_core::diagnose::{Diagnosis, Flaw, Options, diagnose};
 use vice_core::evaluate::{Evaluation, Selection, Stream, Window, evaluate};
 use vice_core::metrics::align::Alignment;
 use vice_core::result::{PixelPart, ResultDocument, Role, Settings};
@@ -16,7 +17,7 @@ use vice_files::image_file::encode_png;
 use vice_synthetic::{Synthetic, SyntheticOptions, write_euroc};
 
 use super::report::with_progress;
-use crate::report::html::{IMAGE_BUDGET_BYTES, Run, render};
+use crate::report::html::{IMAGE_BUDGET_BYTES, Run, Section, render};
 use crate::report::numbers::{first_and_last, mean};
 use crate::report::overlay::{Canvas, Colour, ESTIMATE_GREEN, ESTIMATE_YELLOW, LABEL_BLUE};
 use crate::report::table;
@@ -50,13 +51,17 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         })?;
         bar.finish_and_clear();
     }
-    let document = evaluate_flight(&flight, args.out.as_deref())?;
+    let (document, verdicts) = evaluate_flight(&flight, args.out.as_deref(), verbosity)?;
     let mut text =
         "A 10 s flight through a rendered room; four points on the floor are followed.\n".to_string();
     text.push_str("Three estimates of its motion are evaluated with two sources of depth at key frames:\n\n");
     text.push_str(&table::render(&document));
     text.push('\n');
     text.push_str(&in_words(&document)?);
+    text.push_str("\nWhat `vice diagnose` makes of it, from the labels alone\n");
+    for line in &verdicts {
+        writeln!(text, "- {line}")?;
+    }
     if let Some(out) = &args.out {
         let json = out.join("result.json");
         crate::inputs::write_text(&json, &crate::inputs::to_json(&document)?)?;
@@ -66,8 +71,8 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         // Read back what was rendered: to render it again would take as long as all the rest.
         let written = crate::formats::built_in().open(out, Some("euroc"), &OpenOptions::default())?;
         let shots = with_progress(&document, written.as_ref(), IMAGE_BUDGET_BYTES, verbosity);
-        // What other commands find, such as a diagnosis of each estimate, goes into `run.more`.
-        let run = Run::new(document, shots);
+        let mut run = Run::new(document, shots);
+        run.more.push(Section { title: "Diagnosis".to_string(), lines: verdicts });
         crate::inputs::write_text(&out.join("report.html"), &render(&[run])?)?;
         text.push_str(&kept(out)?);
     } else {
@@ -77,8 +82,12 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     Ok(Outcome::Done)
 }
 
-/// Evaluates the flight; where it is kept, the document says where its files are.
-fn evaluate_flight(flight: &Synthetic, kept: Option<&Path>) -> anyhow::Result<ResultDocument> {
+/// Evaluates the flight and diagnoses each estimate; where it is kept, the document says where its files are.
+fn evaluate_flight(
+    flight: &Synthetic,
+    kept: Option<&Path>,
+    verbosity: Verbosity,
+) -> anyhow::Result<(ResultDocument, Vec<String>)> {
     let camera_name = flight.cameras().into_iter().next().context("the flight has a camera")?;
     let camera = flight.camera(&camera_name)?;
     let frames: Arc<[Stamp]> = flight.frames(&camera_name)?;
@@ -115,26 +124,50 @@ fn evaluate_flight(flight: &Synthetic, kept: Option<&Path>) -> anyhow::Result<Re
         other,
         ..Settings::default()
     };
-    Ok(evaluate(
-        &Evaluation {
-            dataset: flight,
-            camera_name: &camera_name,
-            camera: &camera,
-            body_from_camera: None,
-            frames: &frames,
-            selection: &selection,
-            streams: &streams,
-            anchor: 0,
-            depths: &sources,
-            floor: None,
-            max_gap,
-            subsets: None,
-            align: Alignment::Se3,
-            keep_samples: true,
-            settings,
-        },
-        &|_, _| {},
-    )?)
+    let evaluation = Evaluation {
+        dataset: flight,
+        camera_name: &camera_name,
+        camera: &camera,
+        body_from_camera: None,
+        frames: &frames,
+        selection: &selection,
+        streams: &streams,
+        anchor: 0,
+        depths: &sources,
+        floor: None,
+        max_gap,
+        subsets: None,
+        align: Alignment::Se3,
+        keep_samples: true,
+        settings,
+    };
+    let document = evaluate(&evaluation, &|_, _| {})?;
+    let verdicts = diagnose_estimates(&evaluation, verbosity)?;
+    Ok((document, verdicts))
+}
+
+/// The verdict on each estimate, with the first source of depth.
+fn diagnose_estimates(evaluation: &Evaluation<'_>, verbosity: Verbosity) -> anyhow::Result<Vec<String>> {
+    let mut verdicts = Vec::new();
+    for (stream, estimate) in evaluation.streams.iter().enumerate().filter(|(_, s)| s.role == Role::Estimate)
+    {
+        let options = Options::default();
+        let diagnosis =
+            Diagnosis { evaluation, stream, depth: 0, inertial: None, flaws: &Flaw::ALL, options };
+        let bar = verbosity.progress("diagnosing");
+        let diagnosed = diagnose(&diagnosis, &|done, total| {
+            bar.set_length(total as u64);
+            bar.set_position(done as u64);
+        })?;
+        bar.finish_and_clear();
+        let verdict = &diagnosed.document.verdict;
+        let mut line = format!("{}: {}", estimate.name, verdict.sentence);
+        if let Some(correction) = verdict.corrections.first() {
+            line.push_str(&format!(" ({correction})"));
+        }
+        verdicts.push(line);
+    }
+    Ok(verdicts)
 }
 
 /// What the table shows, with its own numbers.
