@@ -244,56 +244,6 @@ fn without_lines(labels: &LabelSet) -> Vec<(String, Vec<Observation>)> {
     labels.points().iter().map(|p| (p.name.clone(), p.observations.iter().map(bare).collect())).collect()
 }
 
-#[test]
-fn tracks_of_cvat_are_read() {
-    let cvat = |body: &str| {
-        read_cvat(
-            format!("<?xml version=\"1.0\"?>\n<annotations>\n{body}\n</annotations>").as_bytes(),
-            &stamps(9),
-        )
-    };
-    let labels = cvat(
-        "<meta/><track id=\"3\" label=\"corner\"><points frame=\"1\" keyframe=\"1\" points=\"10.5,20.75\"/>\
-         <points frame=\"2\" keyframe=\"0\" occluded=\"1\" points=\"11.5,20.5\"/>\
-         <points frame=\"3\" outside=\"1\" points=\"0,0\"/><points frame=\"6\" points=\"1,2\"/></track>\
-         <track id=\"4\" label=\"other\"><points frame=\"0\" points=\"1,1\"><attribute name=\"source\">detected</attribute>\
-         <attribute name=\"keyframe\">false</attribute></points></track>",
-    )
-    .unwrap();
-    let [corner, other] = labels.points() else { panic!() };
-    assert_eq!((corner.name.as_str(), other.name.as_str()), ("corner", "other"));
-    let [first, second, third] = corner.observations[..] else { panic!() };
-    assert_eq!((first.px, first.stamp.as_nanos(), first.keyframe), (Pixel::new(10.0, 20.25), 1001, true));
-    assert_eq!((second.source, second.occluded), (ObservationSource::Interpolated, true));
-    assert_eq!((third.stamp.as_nanos(), third.keyframe), (1006, true), "it comes back from outside");
-    let detected = other.observations[0];
-    assert_eq!((detected.source, detected.keyframe), (ObservationSource::Detected, false));
-    let same = cvat(
-        "<track id=\"0\" label=\"a\"><points frame=\"0\" points=\"1,1\"/></track><track id=\"1\" label=\"a\"><points frame=\"0\" points=\"1,1\"/></track>",
-    );
-    let names: Vec<String> = same.unwrap().points().iter().map(|p| p.name.clone()).collect();
-    assert_eq!(names, ["a-0", "a-1"]);
-    let says = |body: &str, expected: &str| {
-        let error = cvat(body).unwrap_err();
-        assert!(error.to_string().contains(expected), "{error}");
-        assert!(error.place().is_none_or(|p| p == Place::Line(3)), "{error}");
-    };
-    says("<track label=\"a\"><box frame=\"0\"/></track>", "only tracks of points");
-    says(
-        "<track label=\"a\"><points frame=\"9\" points=\"1,1\"/></track>",
-        "not among the camera's 9 frames",
-    );
-    says("<track label=\"a\"><points frame=\"0\" points=\"1,1;2,2\"/></track>", "one point");
-    says(
-        "<track label=\"a\"><points frame=\"0\" occluded=\"yes\" points=\"1,1\"/></track>",
-        "neither 0 nor 1",
-    );
-    says("<track label=\"\"><points frame=\"0\" points=\"1,1\"/></track>", "empty name");
-    says("<image/>", "no labels");
-    assert!(read_cvat(b"<points/>", &stamps(1)).unwrap_err().to_string().contains("<annotations>"));
-    assert!(read_cvat(b"<annotations>", &stamps(1)).is_err() && read_cvat(b"\xff", &stamps(1)).is_err());
-}
-
 proptest! {
     #[test]
     fn cvat_keeps_all_but_what_a_machine_says_of_itself(labels in any_labels()) {
