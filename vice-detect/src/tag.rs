@@ -3,7 +3,7 @@
 //! After Olson, "AprilTag: a robust and flexible visual fiducial system" (ICRA 2011) and Wang and Olson, "AprilTag 2"
 //! (IROS 2016): brightness models for dark and white that vary over the tag, sharpening before cells are read.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 use vice_core::camera::{Camera, Pixel};
 
 use crate::dark::dark;
@@ -16,6 +16,10 @@ use crate::quads::{Quad, quads};
 const LEAST_CONTRAST: f64 = 12.0;
 /// How much of a cell's difference from its neighbours is added: narrow cells fade into each other.
 const SHARPENING: f64 = 0.25;
+
+/// Seen more obliquely than this (the cosine of about 74 degrees), profiles across one side reach into the next: corners
+/// are worse than 0.2 px then, and no labels.
+const OBLIQUE: f64 = 0.28;
 
 /// Which tags to look for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,23 +66,32 @@ fn read(gray: &Gray, quad: &Quad, options: TagOptions, camera: Option<&Camera>) 
     // Narrow cells for the first look, so that the inside of a one-cell border does not draw the edge to it.
     let sharp = edges::refine(gray, quad, side + 4, camera)?;
     let borders = options.border.map_or(vec![1, 2], |b| vec![b]);
-    borders.into_iter().find_map(|border| {
+    let readings = borders.into_iter().filter_map(|border| {
         let (id, wrong, turns, clear) = decode(gray, &sharp, options.family, border)?;
-        let corners = edges::refine(gray, &sharp, side + 2 * border, camera).unwrap_or(sharp);
-        let corner = |i: usize| {
-            let c = corners[(i + 4 - turns) % 4];
-            Pixel::new(c.x, c.y)
-        };
         let limit = f64::from(options.family.believable_errors() + 1);
-        let confidence = (clear * (1.0 - 0.5 * f64::from(wrong) / limit)) as f32;
-        Some(Tag {
-            id,
-            corners: [corner(0), corner(1), corner(2), corner(3)],
-            wrong_cells: wrong,
-            border,
-            confidence,
-        })
-    })
+        Some((border, id, wrong, turns, clear * (1.0 - 0.5 * f64::from(wrong) / limit)))
+    });
+    // The cells of a small family may read alike, if less clearly, where the border is taken for narrower than it is.
+    let (border, id, wrong_cells, turns, confidence) = readings.max_by(|a, b| a.4.total_cmp(&b.4))?;
+    let corners = edges::refine(gray, &sharp, side + 2 * border, camera).unwrap_or(sharp);
+    let (narrow, wide) = widths(&corners);
+    if narrow < OBLIQUE * wide {
+        return None;
+    }
+    let corner = |i: usize| {
+        let c = corners[(i + 4 - turns) % 4];
+        Pixel::new(c.x, c.y)
+    };
+    let corners = [corner(0), corner(1), corner(2), corner(3)];
+    Some(Tag { id, corners, wrong_cells, border, confidence: confidence as f32 })
+}
+
+/// How wide a tag is in the picture where it is narrowest and widest, pixels: the singular values of its mean sides.
+fn widths(quad: &Quad) -> (f64, f64) {
+    let [a, b, c, d] = *quad;
+    let sides = Matrix2::from_columns(&[(b - a + c - d) / 2.0, (d - a + c - b) / 2.0]);
+    let widths = sides.singular_values();
+    (widths.min(), widths.max())
 }
 
 /// Id, wrong cells, turns, and how clear the least clear cell is.

@@ -11,7 +11,7 @@ use vice_core::error::{DataError, DataResult};
 use crate::rng::{Rng, hash, unit};
 
 /// Rays along each side of a pixel.
-const RAYS: i32 = 6;
+const RAYS: i32 = 4;
 
 /// A flat target of square cells, dark or white, on white paper.
 #[derive(Clone, Debug, PartialEq)]

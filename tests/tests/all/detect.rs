@@ -219,7 +219,7 @@ fn what_cannot_be_found_is_said_and_nothing_is_written() {
         args.extend(more);
         vice(&args)
     };
-    refused(&run(&["--apriltag", "36h11"]), 1, &["no tag 36h11 in view in 4 frames"]);
+    refused(&run(&["--apriltag", "36h11"]), 1, &["no tag 36h11 in view in 6 frames"]);
     refused(&run(&["--apriltag", "99h1"]), 2, &["99h1", "36h11, 25h9, 16h5"]);
     refused(&run(&["--chessboard", "5x6"]), 1, &["5x6", "--chessboard 6x7?"]);
     refused(&run(&["--chessboard", "2x9"]), 2, &["2x9"]);
@@ -255,5 +255,5 @@ fn what_cannot_be_found_is_said_and_nothing_is_written() {
     let run = vice(&args);
     assert_eq!(run.code, 0, "{}{}", run.stdout, run.stderr);
     assert!(run.stderr.contains("1 frames could not be decoded"), "{}", run.stderr);
-    assert!(run.stdout.starts_with("3 frames, 3 with the chessboard"), "{}", run.stdout);
+    assert!(run.stdout.starts_with("5 frames, 5 with the chessboard"), "{}", run.stdout);
 }

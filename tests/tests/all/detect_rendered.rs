@@ -82,14 +82,15 @@ fn errors(tilt_deg: f64) -> (Vec<f64>, f64) {
 
 #[test]
 fn corners_of_tilted_blurred_noisy_tags() {
-    for tilt_deg in [10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 75.0, 80.0] {
+    for tilt_deg in [10.0, 25.0, 40.0, 55.0, 65.0, 72.0, 80.0] {
         let (mut errors, found) = errors(tilt_deg);
         errors.sort_by(f64::total_cmp);
         let worst = errors.last().copied().unwrap_or(0.0);
         let median = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
         eprintln!("{tilt_deg} deg: {:.0} % found, median {median:.3} px, worst {worst:.3} px", 100.0 * found);
         assert!(worst < 0.2, "{tilt_deg} deg: {worst} px");
-        assert!(found == 1.0 || tilt_deg > 60.0, "{tilt_deg} deg: {found}");
+        // Steeper ones would be too coarse, and are not given.
+        assert!(found == 1.0 || tilt_deg > 74.0, "{tilt_deg} deg: {found}");
     }
 }
 
