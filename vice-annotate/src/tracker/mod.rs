@@ -12,8 +12,9 @@
 //!
 //! [`PointTrack`] is what labels are made with. [`track_translation`] is its first stage alone, for many points.
 //!
-//! The crate `patch-tracker` was looked at first: it matches 52 samples of whole gray levels in five steps, always
-//! against the frame before, so that it drifts, and gives no confidence; see `benches/tracker.rs` for figures.
+//! The crate `patch-tracker` 0.4 was measured first, on the same 200 corners of eight real pairs of 752x480 and one thread:
+//! it lies 0.09 px from OpenCV in the median but up to 2.6 px for one corner in ten, and takes 6 to 9 ms, where OpenCV
+//! takes 1.9 and this module 1.1 to 1.4. It has no template of an earlier frame and no confidence.
 
 mod affine;
 mod corners;
