@@ -30,7 +30,7 @@ pub(super) fn atan<N: Number>(r: N) -> N {
     let small = r.at_most(r.of(TURN_45));
     let middle = r.at_most(r.of(TURN_90));
     let one = r.of(1.0);
-    let above = N::select(small, r, N::select(middle, r - 1.0, -one));
+    let above = N::select(small, r, N::select(middle, r - 1.0, r.of(-1.0)));
     let below = N::select(small, one, N::select(middle, r + 1.0, r));
     let turned = N::select(small, r.of(0.0), N::select(middle, r.of(FRAC_PI_4), r.of(FRAC_PI_2)));
     let t = above / below;

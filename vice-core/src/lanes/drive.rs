@@ -160,8 +160,10 @@ impl<T: Element, K: Kernel<IN, OUT>, const IN: usize, const OUT: usize> Drive<'_
             self.decide(from, to, unsure, words, inout.map(|l| l.v), input.map(|l| l.v));
         }
         if let Some(valid) = &mut self.valid {
-            for (flag, word) in valid[from..to].iter_mut().zip(&*words) {
-                *flag = *word != 0;
+            let (flags, mut i) = (&mut valid[from..to], 0);
+            while i < flags.len() {
+                flags[i] = words[i] != 0;
+                i += 1;
             }
         }
         flags

@@ -69,16 +69,21 @@ impl Element for f32 {
     fn load<S: Simd>(simd: S, from: &[Self]) -> S::f64s {
         const { assert!(S::F64_LANES <= MAX_LANES) };
         let mut wide = [0.0; MAX_LANES];
-        for (wide, narrow) in wide.iter_mut().zip(from) {
-            *wide = f64::from(*narrow);
+        // Loops count: the making of an iterator is not always inlined.
+        let mut i = 0;
+        while i < from.len() {
+            wide[i] = f64::from(from[i]);
+            i += 1;
         }
         f64::load(simd, &wide[..S::F64_LANES])
     }
     #[inline(always)]
     fn store<S: Simd>(_: S, numbers: S::f64s, to: &mut [Self]) {
         let wide: &[f64] = bytemuck::cast_slice(std::slice::from_ref(&numbers));
-        for (narrow, wide) in to.iter_mut().zip(wide) {
-            *narrow = *wide as f32;
+        let mut i = 0;
+        while i < to.len() {
+            to[i] = wide[i] as f32;
+            i += 1;
         }
     }
 }

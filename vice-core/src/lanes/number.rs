@@ -1,6 +1,6 @@
 //! What formulas are written in: one number, or as many as a vector register holds.
 
-use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Sub};
 
 use pulp::Simd;
 
@@ -11,7 +11,6 @@ pub(crate) trait Number:
     + Sub<Output = Self>
     + Mul<Output = Self>
     + Div<Output = Self>
-    + Neg<Output = Self>
     + Add<f64, Output = Self>
     + Sub<f64, Output = Self>
     + Mul<f64, Output = Self>
@@ -92,7 +91,9 @@ impl<S: Simd> Number for Lanes<S> {
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        Self { simd: self.simd, v: self.simd.abs_f64s(self.v) }
+        // `abs_f64s` is not always inlined, and would cost a call and a spill of all registers.
+        let negative = self.simd.sub_f64s(self.simd.splat_f64s(0.0), self.v);
+        Self { simd: self.simd, v: self.simd.max_f64s(self.v, negative) }
     }
     #[inline(always)]
     fn atan(self) -> Self {
@@ -153,11 +154,3 @@ macro_rules! operator {
 }
 
 operator!(Add add add_f64s, Sub sub sub_f64s, Mul mul mul_f64s, Div div div_f64s);
-
-impl<S: Simd> Neg for Lanes<S> {
-    type Output = Self;
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self { simd: self.simd, v: self.simd.neg_f64s(self.v) }
-    }
-}
