@@ -119,6 +119,10 @@ pub(crate) fn time_zero(document: &ResultDocument) -> Stamp {
 
 /// Pixels with as many digits as a person wants to read.
 pub(crate) fn px(value: f64) -> String {
+    // Squares of what a document from elsewhere holds may not fit a double.
+    if !value.is_finite() {
+        return "more px than can be counted".to_string();
+    }
     format!("{:.*} px", super::rows::decimals(value), value)
 }
 
@@ -133,7 +137,9 @@ mod tests {
         assert_eq!(quantile(&[1.0, 2.0, 4.0], 0.5), Some(2.0));
         assert_eq!(quantile(&[1.0, 2.0], 0.25), Some(1.25));
         assert_eq!(quantile(&[], 0.5), None);
-        assert_eq!(correlation(&[(0.0, 1.0), (1.0, 3.0), (2.0, 5.0)]), Some(1.0));
+        let line = correlation(&[(0.0, 1.0), (1.0, 3.0), (2.0, 5.0)]).unwrap();
+        assert!((line - 1.0).abs() < 1e-12);
+        assert_eq!(px(f64::INFINITY), "more px than can be counted");
         assert_eq!(correlation(&[(0.0, 1.0), (1.0, 1.0), (2.0, 1.0)]), None);
         assert_eq!(correlation(&[(0.0, 1.0), (1.0, 2.0)]), None);
     }
