@@ -119,11 +119,11 @@ pub(crate) fn time_zero(document: &ResultDocument) -> Stamp {
 
 /// Pixels with as many digits as a person wants to read.
 pub(crate) fn px(value: f64) -> String {
-    // The square of a huge error is infinite, which is a word for nobody.
-    match value.is_finite() {
-        true => format!("{:.*} px", super::rows::decimals(value), value),
-        false => "more pixels than there are numbers for".to_string(),
+    // Squares of what a document from elsewhere holds may not fit a double.
+    if !value.is_finite() {
+        return "more px than can be counted".to_string();
     }
+    format!("{:.*} px", super::rows::decimals(value), value)
 }
 
 #[cfg(test)]
@@ -139,6 +139,7 @@ mod tests {
         assert_eq!(quantile(&[], 0.5), None);
         let line = correlation(&[(0.0, 1.0), (1.0, 3.0), (2.0, 5.0)]).unwrap();
         assert!((line - 1.0).abs() < 1e-12);
+        assert_eq!(px(f64::INFINITY), "more px than can be counted");
         assert_eq!(correlation(&[(0.0, 1.0), (1.0, 1.0), (2.0, 1.0)]), None);
         assert_eq!(correlation(&[(0.0, 1.0), (1.0, 2.0)]), None);
     }
