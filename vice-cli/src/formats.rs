@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use vice_core::error::DataError;
+use vice_core::error::one_line;
 use vice_core::registry::Registry;
 use vice_host::{LoadOptions, Plugin, search};
 
@@ -71,7 +71,7 @@ impl Formats {
         for file in found.libraries {
             match Plugin::load(&file, &args.options()) {
                 Ok(plugin) => formats.found(plugin),
-                Err(error) => formats.left_out.push(format!("plugin {}", line_of(&error))),
+                Err(error) => formats.left_out.push(format!("plugin {}", one_line(&error))),
             }
         }
         Ok(formats)
@@ -116,15 +116,4 @@ impl Formats {
         self.registry.add(Box::new(plugin.clone()));
         self.plugins.push(LoadedPlugin { plugin, replaces });
     }
-}
-
-/// An error with its causes.
-fn line_of(error: &DataError) -> String {
-    let mut line = error.to_string();
-    let mut cause = std::error::Error::source(error);
-    while let Some(error) = cause {
-        line = format!("{line}: {error}");
-        cause = error.source();
-    }
-    line
 }

@@ -8,6 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use tracing_subscriber::fmt::format::Writer;
 use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields};
 use tracing_subscriber::registry::LookupSpan;
+use vice_core::error::one_line;
 
 /// How a command ended that did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -132,23 +133,7 @@ pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
 
 /// Prints an error and its causes on one line.
 pub(crate) fn print_error(error: &anyhow::Error) {
-    let _ = writeln!(std::io::stderr(), "error: {}", printable(&error_line(error)));
-}
-
-/// An error and its causes, each said once.
-fn error_line(error: &anyhow::Error) -> String {
-    let mut line = String::new();
-    for cause in error.chain() {
-        let text = cause.to_string();
-        // Transparent wrappers repeat what they wrap.
-        if !line.ends_with(&text) {
-            if !line.is_empty() {
-                line.push_str(": ");
-            }
-            line.push_str(&text);
-        }
-    }
-    line
+    let _ = writeln!(std::io::stderr(), "error: {}", printable(&one_line(error.as_ref())));
 }
 
 /// Text from data made safe for a terminal: control characters would move its cursor or change its colours, and those
@@ -184,9 +169,9 @@ mod tests {
     fn an_error_is_one_line_and_says_each_cause_once() {
         let io = std::io::Error::other("disk on\nfire");
         let error = Err::<(), _>(io).context("cannot write x").unwrap_err();
-        assert_eq!(printable(&error_line(&error)), "cannot write x: disk on fire");
+        assert_eq!(printable(&one_line(error.as_ref())), "cannot write x: disk on fire");
         let twice = anyhow::anyhow!("same").context("same");
-        assert_eq!(error_line(&twice), "same");
+        assert_eq!(one_line(twice.as_ref()), "same");
         assert_eq!(printable("a\u{1b}[31mb"), "a [31mb");
         assert_eq!(printable("gpj.\u{202e}txt\u{2028}"), "gpj. txt ");
     }

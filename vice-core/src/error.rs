@@ -112,9 +112,34 @@ impl std::error::Error for DataError {
     }
 }
 
+/// An error and its causes on one line, each said once.
+pub fn one_line(error: &dyn std::error::Error) -> String {
+    let mut line = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        let text = error.to_string();
+        // Transparent wrappers repeat what they wrap.
+        if !line.ends_with(&text) {
+            line.push_str(": ");
+            line.push_str(&text);
+        }
+        cause = error.source();
+    }
+    line
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn causes_stand_on_the_same_line_and_each_once() {
+        let inner = DataError::new("disk on fire");
+        let error = DataError::new("cannot be read").at("a.bag").because(inner);
+        assert_eq!(one_line(&error), "a.bag: cannot be read: disk on fire");
+        let twice = DataError::new("cannot be read: disk on fire").because(DataError::new("disk on fire"));
+        assert_eq!(one_line(&twice), "cannot be read: disk on fire");
+    }
 
     #[test]
     fn the_place_nearest_to_the_cause_wins() {

@@ -9,7 +9,7 @@ use vice_abi::contract::{
     self, ABI_VERSION, CameraStampCall, Entry, FLAG_THREAD_SAFE, FreeCall, PluginTable, ProbeCall,
 };
 use vice_core::dataset::{Dataset, DatasetFactory, FormatInfo, OpenOptions, Probe, SettingInfo};
-use vice_core::error::{DataError, DataResult};
+use vice_core::error::{DataError, DataResult, one_line};
 
 use crate::border::{self, Fault};
 use crate::host_log::Context;
@@ -175,7 +175,7 @@ impl Library {
 
 /// The entry of a library, which stays loaded.
 fn entry(path: &Path) -> DataResult<Entry> {
-    let failed = |e: libloading::Error| DataError::new("cannot be loaded").at(path).because(cause(e));
+    let failed = |e: libloading::Error| DataError::new("cannot be loaded").at(path).because(one_line(&e));
     // SAFETY: loading runs the library's initialisers: the user named it, or put it where plugins are.
     #[cfg(unix)]
     let library = unsafe {
@@ -195,22 +195,8 @@ fn entry(path: &Path) -> DataResult<Entry> {
         DataError::new(format!("has no symbol {}", contract::ENTRY_SYMBOL))
             .at(path)
             .hint("is it a plugin of VICE? C++: VICE_PLUGIN(...), Rust: vice_abi::export_plugin!(...)")
-            .because(cause(e))
+            .because(one_line(&e))
     })
-}
-
-/// What the loader says, once.
-fn cause(error: libloading::Error) -> String {
-    let mut text = error.to_string();
-    let mut source = std::error::Error::source(&error);
-    while let Some(error) = source {
-        let more = error.to_string();
-        if !text.contains(&more) {
-            text = format!("{text}: {more}");
-        }
-        source = error.source();
-    }
-    text
 }
 
 /// Copies as much of the table as the plugin says there is; what is beyond is zero, as if it were null.

@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::Vector3;
 use vice_core::camera::Camera;
 use vice_core::dataset::{Dataset, DepthImage, Fact, Floor, GROUND_TRUTH, Image, Plane};
-use vice_core::error::{DataError, DataResult};
+use vice_core::error::{DataError, DataResult, one_line};
 use vice_core::frames::{BodyFromCamera, Sensor};
 use vice_core::imu::{ImuSample, InertialState, fit_velocity};
 use vice_core::time::{Span, Stamp};
@@ -91,7 +91,7 @@ impl RosDataset {
         let encoding = encoding.unwrap_or(crate::container::Encoding::Other);
         let reader = Reader::new(payload.bytes(), encoding).map_err(|e| DataError::new(e.to_string()));
         reader.and_then(|r| decode(r, images.packing)).map_err(|e| {
-            let problem = format!("topic {}, frame {index}: {}", images.topic, with_causes(&e));
+            let problem = format!("topic {}, frame {index}: {}", images.topic, one_line(&e));
             self.recording.place(locator, DataError::new(problem))
         })
     }
@@ -109,17 +109,6 @@ impl RosDataset {
     fn reference(&self) -> Option<Trajectory> {
         self.streams().iter().find_map(|s| self.trajectory(s).ok())
     }
-}
-
-/// An error and its causes in one line.
-fn with_causes(error: &DataError) -> String {
-    let mut text = error.to_string();
-    let mut cause = std::error::Error::source(error);
-    while let Some(e) = cause {
-        text = format!("{text}: {e}");
-        cause = e.source();
-    }
-    text
 }
 
 impl Dataset for RosDataset {
@@ -152,7 +141,7 @@ impl Dataset for RosDataset {
         };
         calibration::camera(&info.info, is_rectified(&color.topic)).map_err(|e| {
             let topic = self.chosen.info.map_or("camera_info", |t| self.topics[t].name.as_str());
-            DataError::new(format!("topic {topic}: {}", with_causes(&e))).at(&self.path)
+            DataError::new(format!("topic {topic}: {}", one_line(&e))).at(&self.path)
         })
     }
 
@@ -178,7 +167,7 @@ impl Dataset for RosDataset {
             return Ok(BodyFromCamera::identity());
         }
         let chain = self.tf.chain(base, camera_frame).map_err(|e| {
-            let problem = format!("the camera has no place in the body: {}", with_causes(&e));
+            let problem = format!("the camera has no place in the body: {}", one_line(&e));
             DataError::new(problem)
                 .at(&self.path)
                 .hint("set base_frame and camera_frame, urdf or body_from_camera")
@@ -226,7 +215,7 @@ impl Dataset for RosDataset {
         let samples = self.imu.get_or_init(|| {
             let stamps = self.settings.stamps().map_err(|e| e.to_string())?;
             let base = self.base().map_err(|e| e.to_string())?;
-            imu::read(&self.recording, name, stamps, &self.tf, base).map_err(|e| with_causes(&e))
+            imu::read(&self.recording, name, stamps, &self.tf, base).map_err(|e| one_line(&e))
         });
         samples.clone().map_err(|problem| DataError::new(format!("topic {name}: {problem}")).at(&self.path))
     }

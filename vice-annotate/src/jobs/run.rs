@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
-use vice_core::error::DataResult;
+use vice_core::error::{DataResult, one_line};
 
 use super::lane::{Fate, Lane};
 use super::{Direction, Job, Listener, Progress, TrackRequest};
@@ -165,7 +165,7 @@ impl Runner<'_> {
         let cells: Vec<_> = lanes.iter_mut().flat_map(|lane| lane.cells(document, self.desk)).collect();
         let id = self.job.state().id;
         let committed = store.commit(By::Track, self.label(), Some(id), cells);
-        let changed = committed.map_err(|e: StoreError| crate::server::with_cause(&e))?;
+        let changed = committed.map_err(|e: StoreError| one_line(&e))?;
         if !changed.points.is_empty() {
             self.listener.changed(&store, &changed);
         }

@@ -4,7 +4,7 @@ use axum::Json;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use serde_json::json;
-use vice_core::error::DataError;
+use vice_core::error::{DataError, one_line};
 
 use crate::store::StoreError;
 
@@ -38,7 +38,7 @@ impl ApiError {
 
 impl From<StoreError> for ApiError {
     fn from(error: StoreError) -> Self {
-        let text = with_cause(&error);
+        let text = one_line(&error);
         match error {
             StoreError::Stale { revision } => {
                 let hint = "read the state again";
@@ -54,22 +54,8 @@ impl From<StoreError> for ApiError {
 
 impl From<DataError> for ApiError {
     fn from(error: DataError) -> Self {
-        Self::new(StatusCode::UNPROCESSABLE_ENTITY, with_cause(&error))
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, one_line(&error))
     }
-}
-
-/// An error and its causes on one line, each said once.
-pub(crate) fn with_cause(error: &dyn std::error::Error) -> String {
-    let mut line = error.to_string();
-    let mut cause = error.source();
-    while let Some(error) = cause {
-        let text = error.to_string();
-        if !line.contains(&text) {
-            line = format!("{line}: {text}");
-        }
-        cause = error.source();
-    }
-    line
 }
 
 impl IntoResponse for ApiError {

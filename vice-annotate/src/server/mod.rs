@@ -25,8 +25,6 @@ use tokio::net::TcpListener;
 use tokio::sync::{Semaphore, watch};
 use vice_core::error::{DataError, DataResult};
 
-pub(crate) use error::with_cause;
-
 use crate::desk::Desk;
 use crate::jobs::Jobs;
 use crate::store::Saver;

@@ -5,7 +5,7 @@ use std::ffi::c_void;
 use std::path::PathBuf;
 
 use vice_core::dataset::{CloudSource, Dataset, OpenOptions, Probe};
-use vice_core::error::{DataError, DataResult};
+use vice_core::error::{DataError, DataResult, one_line};
 use vice_core::time::Stamp;
 
 use super::owned::{self, Facts, Texts};
@@ -56,21 +56,6 @@ impl Open {
     }
 }
 
-/// An error with its causes on one line.
-fn line_of(error: &DataError) -> String {
-    let mut line = error.to_string();
-    let mut cause = std::error::Error::source(error);
-    while let Some(error) = cause {
-        let text = error.to_string();
-        if !line.ends_with(&text) {
-            line.push_str(": ");
-            line.push_str(&text);
-        }
-        cause = error.source();
-    }
-    line
-}
-
 /// Runs a call: `Ok(Some)` is written, `Ok(None)` is [`contract::NONE`], an error or a panic goes to the message.
 ///
 /// # Safety
@@ -84,7 +69,7 @@ unsafe fn answer<T>(out: *mut T, message: *mut Message, call: impl FnOnce() -> D
             return contract::OK;
         }
         Ok(Ok(None)) => return contract::NONE,
-        Ok(Err(error)) => (contract::ERROR, line_of(&error)),
+        Ok(Err(error)) => (contract::ERROR, one_line(&error)),
         Err(panic) => (contract::EXCEPTION, panic),
     };
     if !message.is_null() {

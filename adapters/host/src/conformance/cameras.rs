@@ -2,9 +2,10 @@
 
 use vice_core::camera::Camera;
 use vice_core::dataset::{Dataset, Image};
+use vice_core::error::one_line;
 use vice_core::time::Span;
 
-use super::{CameraLists, Check, line_of, spread};
+use super::{CameraLists, Check, spread};
 
 impl Check<'_> {
     pub(super) fn camera(&mut self, dataset: &dyn Dataset, lists: &CameraLists) {
@@ -16,7 +17,7 @@ impl Check<'_> {
                 Some(camera)
             }
             Err(error) => {
-                self.fault(format!("camera {name}: no calibration: {}", line_of(&error)));
+                self.fault(format!("camera {name}: no calibration: {}", one_line(&error)));
                 None
             }
         };
@@ -89,7 +90,7 @@ impl Check<'_> {
                     }
                 }
                 Err(error) => {
-                    first_error.get_or_insert_with(|| line_of(&error));
+                    first_error.get_or_insert_with(|| one_line(&error));
                 }
             }
         }

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use vice_core::dataset::{Dataset, Probe};
+use vice_core::error::one_line;
 
-use super::{CameraLists, Check, Lists, line_of};
+use super::{CameraLists, Check, Lists};
 
 impl Check<'_> {
     pub(super) fn format(&mut self) {
@@ -81,7 +82,7 @@ impl Check<'_> {
                 self.fault(format!("it does not say why it cannot open {what}"));
             }
             Err(error) => {
-                let line = line_of(&error);
+                let line = one_line(&error);
                 if !line.contains(&path.display().to_string()) {
                     self.suspicious(format!("the error for {what} does not name the path: `{line}`"));
                 }
@@ -123,7 +124,7 @@ impl Check<'_> {
                 Some(dataset)
             }
             Err(error) => {
-                self.fault(format!("it cannot open the data set: {}", line_of(&error)));
+                self.fault(format!("it cannot open the data set: {}", one_line(&error)));
                 None
             }
         }
@@ -162,7 +163,7 @@ impl Check<'_> {
             self.step(format!("frames of camera {name}"));
             match dataset.frames(&name) {
                 Ok(frames) => lists.cameras.push(CameraLists { name, frames }),
-                Err(error) => self.fault(format!("frames of camera {name}: {}", line_of(&error))),
+                Err(error) => self.fault(format!("frames of camera {name}: {}", one_line(&error))),
             }
         }
         lists

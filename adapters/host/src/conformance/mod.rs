@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use vice_core::dataset::{Dataset, DatasetFactory, OpenOptions};
-use vice_core::error::DataError;
+use vice_core::error::{DataError, one_line};
 use vice_core::time::Stamp;
 
 use crate::dataset::MISTAKE;
@@ -155,7 +155,7 @@ impl Check<'_> {
 
     /// An error where data may be missing, unless the adapter itself is at fault.
     fn error(&mut self, place: &str, error: &DataError) {
-        let line = line_of(error);
+        let line = one_line(error);
         let verdict = if line.contains(MISTAKE) { Verdict::Fault } else { Verdict::Suspicious };
         self.find(verdict, format!("{place}: {line}"));
     }
@@ -169,25 +169,11 @@ impl Check<'_> {
         match self.subject.factory.open(&self.path, self.subject.options) {
             Ok(dataset) => Some(dataset),
             Err(error) => {
-                self.fault(format!("it opened before, but not again: {}", line_of(&error)));
+                self.fault(format!("it opened before, but not again: {}", one_line(&error)));
                 None
             }
         }
     }
-}
-
-/// An error with its causes on one line.
-fn line_of(error: &DataError) -> String {
-    let mut line = error.to_string();
-    let mut cause = std::error::Error::source(error);
-    while let Some(error) = cause {
-        let text = error.to_string();
-        if !line.ends_with(&text) {
-            line = format!("{line}: {text}");
-        }
-        cause = error.source();
-    }
-    line
 }
 
 /// At most `limit` places of `count`, evenly spread, the first and the last among them.

@@ -1,10 +1,11 @@
 //! Pose streams and inertial samples.
 
 use vice_core::dataset::{Dataset, GROUND_TRUTH};
+use vice_core::error::one_line;
 use vice_core::imu;
 use vice_core::time::Span;
 
-use super::{Check, Lists, line_of};
+use super::{Check, Lists};
 
 impl Check<'_> {
     pub(super) fn streams(&mut self, dataset: &dyn Dataset, lists: &Lists) {
@@ -33,7 +34,7 @@ impl Check<'_> {
                         ));
                     }
                 }
-                Err(error) => self.fault(format!("pose stream {name}: {}", line_of(&error))),
+                Err(error) => self.fault(format!("pose stream {name}: {}", one_line(&error))),
             }
         }
         if lists.streams.is_empty() {
@@ -68,7 +69,7 @@ impl Check<'_> {
                     self.suspicious(format!("the mean angular rate is {rate:.1}: is it in rad/s?"));
                 }
             }
-            Err(error) => self.fault(format!("inertial samples: {}", line_of(&error))),
+            Err(error) => self.fault(format!("inertial samples: {}", one_line(&error))),
         }
         self.step("inertial state at the first and last frame");
         let Some((first, last)) = lists.extent() else { return };
@@ -83,7 +84,7 @@ impl Check<'_> {
                     }
                 }
                 Ok(None) => {}
-                Err(error) => self.fault(format!("inertial state at {stamp} ns: {}", line_of(&error))),
+                Err(error) => self.fault(format!("inertial state at {stamp} ns: {}", one_line(&error))),
             }
         }
     }

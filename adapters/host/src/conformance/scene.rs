@@ -1,8 +1,9 @@
 //! What is known of the scene: depth images, scan, floor; and facts.
 
 use vice_core::dataset::{CloudSource, Dataset, Floor};
+use vice_core::error::one_line;
 
-use super::{Check, Lists, line_of, spread};
+use super::{Check, Lists, spread};
 
 impl Check<'_> {
     pub(super) fn depth(&mut self, dataset: &dyn Dataset, lists: &Lists) {
@@ -38,7 +39,7 @@ impl Check<'_> {
                     }
                     Ok(None) => {}
                     Err(error) => {
-                        self.fault(format!("depth image {place} of camera {name}: {}", line_of(&error)));
+                        self.fault(format!("depth image {place} of camera {name}: {}", one_line(&error)));
                         break;
                     }
                 }
@@ -76,7 +77,7 @@ impl Check<'_> {
                 CloudSource::Points(points) => self.good(format!("a scan of {} points", points.len())),
                 _ => {}
             },
-            Err(error) => self.fault(format!("scan: {}", line_of(&error))),
+            Err(error) => self.fault(format!("scan: {}", one_line(&error))),
         }
         self.step("floor");
         if let Some((first, _)) = lists.extent() {
