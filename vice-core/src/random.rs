@@ -17,4 +17,11 @@ impl SplitMix {
     pub(crate) fn below(&mut self, n: u64) -> u64 {
         ((u128::from(self.next()) * u128::from(n)) >> 64) as u64
     }
+
+    /// How often each of `n` is drawn in `n` draws with replacement.
+    pub(crate) fn resample(&mut self, n: usize) -> Vec<u32> {
+        let mut times = vec![0_u32; n];
+        (0..n).for_each(|_| times[self.below(n as u64) as usize] += 1);
+        times
+    }
 }

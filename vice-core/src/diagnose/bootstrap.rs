@@ -27,14 +27,9 @@ impl Resampled {
             DVector::from_iterator(fit.parameters.len(), fit.parameters.iter().map(|p| fit.theta[*p]));
         let ridge = fit.ridge();
         let mut random = SplitMix(seed);
-        let mut draw = |n: usize| {
-            let mut times = vec![0_u32; n];
-            (0..n).for_each(|_| times[random.below(n as u64) as usize] += 1);
-            times
-        };
         let mut values = Vec::with_capacity(resamples);
         for _ in 0..resamples {
-            let (point_times, block_times) = (draw(points), draw(blocks.len()));
+            let (point_times, block_times) = (random.resample(points), random.resample(blocks.len()));
             let mut sum = Normal::zeros(fit.parameters.len());
             for (cell, piece) in blocks.cells.iter().zip(&fit.pieces) {
                 let times = point_times[cell.point] * block_times[cell.block];

@@ -126,18 +126,8 @@ pub fn diagnose(
     diagnosis: &Diagnosis<'_>,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Diagnosed, DiagnoseError> {
-    let Diagnosis { evaluation, stream, depth, inertial, options, .. } = *diagnosis;
-    let flaws = flaws_of(diagnosis)?;
-    let problem = Problem::new(evaluation, stream, depth, inertial)?;
-    let blocks = Blocks::new(&problem.labels);
-    let labels = labels_part(&problem, &blocks);
-    check_labels(&labels)?;
-    let mut done = 0;
-    let fits = singles(&problem, &blocks, &flaws, || {
-        done += 1;
-        progress(done, flaws.len());
-    })?;
-    let noise = least_noise(&fits, &problem, &blocks);
+    let Diagnosis { evaluation, stream, depth, options, .. } = *diagnosis;
+    let Alone { problem, blocks, labels, fits, noise, .. } = Alone::fit(diagnosis, progress)?;
     let judge =
         Judge { problem: &problem, blocks: &blocks, options, noise, ruler: Ruler::new(&noise, &blocks) };
     let found = judge.decide(&fits)?;
@@ -165,6 +155,37 @@ pub fn diagnose(
         verdict: verdict_of(&found, &fits, fitted, rmse, time_offset_s),
     };
     Ok(Diagnosed { document, theta })
+}
+
+/// What a diagnosis and a sensitivity begin with: each flaw fitted alone.
+struct Alone<'a> {
+    problem: Problem<'a>,
+    blocks: Blocks,
+    labels: LabelsPart,
+    /// How many flaws were tried; those that cannot be evaluated have no fit.
+    tried: usize,
+    fits: Vec<Fit>,
+    /// That of the fit that leaves least of it.
+    noise: Noise,
+}
+
+impl<'a> Alone<'a> {
+    /// `progress` is called with (done, total) as flaws are fitted.
+    fn fit(diagnosis: &Diagnosis<'a>, progress: impl Fn(usize, usize)) -> Result<Self, DiagnoseError> {
+        let Diagnosis { evaluation, stream, depth, inertial, .. } = *diagnosis;
+        let flaws = flaws_of(diagnosis)?;
+        let problem = Problem::new(evaluation, stream, depth, inertial)?;
+        let blocks = Blocks::new(&problem.labels);
+        let labels = labels_part(&problem, &blocks);
+        check_labels(&labels)?;
+        let mut done = 0;
+        let fits = singles(&problem, &blocks, &flaws, || {
+            done += 1;
+            progress(done, flaws.len());
+        })?;
+        let noise = least_noise(&fits, &problem, &blocks);
+        Ok(Self { problem, blocks, labels, tried: flaws.len(), fits, noise })
+    }
 }
 
 /// The flaws to look for, in their own order.

@@ -5,15 +5,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::Blocks;
 use super::bootstrap::Resampled;
 use super::flaw::{Flaw, PARAMETERS};
 use super::problem::{Problem, rmse_px};
 use super::solve::Fit;
 use super::theta::Theta;
-use super::verdict::singles;
-use super::{DiagnoseError, Diagnosis, check_labels, flaws_of, labels_part, least_noise};
-use super::{LabelsPart, Observability};
+use super::{Alone, DiagnoseError, Diagnosis, LabelsPart, Observability};
 
 /// The schema's name and version.
 pub const SENSITIVITY_SCHEMA: &str = "vice.sensitivity/1";
@@ -81,18 +78,11 @@ pub fn sensitivity(
     diagnosis: &Diagnosis<'_>,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<SensitivityDocument, DiagnoseError> {
-    let Diagnosis { evaluation, stream, depth, inertial, options, .. } = *diagnosis;
-    let flaws = flaws_of(diagnosis)?;
-    let problem = Problem::new(evaluation, stream, depth, inertial)?;
-    let blocks = Blocks::new(&problem.labels);
-    let labels = labels_part(&problem, &blocks);
-    check_labels(&labels)?;
-    let mut done = 0;
-    let fits = singles(&problem, &blocks, &flaws, || {
-        done += 1;
-        progress(done, 2 * flaws.len());
-    })?;
-    let sigma_px = least_noise(&fits, &problem, &blocks).after_px(blocks.typical_seconds());
+    let Diagnosis { evaluation, stream, depth, options, .. } = *diagnosis;
+    let alone = Alone::fit(diagnosis, |done, total| progress(done, 2 * total))?;
+    let Alone { problem, blocks, labels, tried, fits, noise } = alone;
+    let mut done = tried;
+    let sigma_px = noise.after_px(blocks.typical_seconds());
     let mut curves = Vec::new();
     for fit in &fits {
         let deviations = Resampled::new(fit, &blocks, options.resamples, options.seed).deviations();
@@ -112,7 +102,7 @@ pub fn sensitivity(
             });
         }
         done += 1;
-        progress(done, 2 * flaws.len());
+        progress(done, 2 * tried);
     }
     Ok(SensitivityDocument {
         schema: SENSITIVITY_SCHEMA.to_string(),

@@ -147,14 +147,9 @@ fn resample(cells: &[(usize, usize, Cell)], points: usize, segments: usize, seed
         return vec![];
     }
     let mut random = SplitMix(seed);
-    let mut draw = |n: usize| {
-        let mut times = vec![0_u32; n];
-        (0..n).for_each(|_| times[random.below(n as u64) as usize] += 1);
-        times
-    };
     let mut sums = Vec::with_capacity(RESAMPLES);
     for _ in 0..RESAMPLES {
-        let (of_points, of_segments) = (draw(points), draw(segments));
+        let (of_points, of_segments) = (random.resample(points), random.resample(segments));
         let mut sum = Cell::default();
         for (point, segment, cell) in cells {
             sum.add(cell, f64::from(of_points[*point]) * f64::from(of_segments[*segment]));
