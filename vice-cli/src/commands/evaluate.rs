@@ -85,15 +85,16 @@ fn percent(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
+    let samples = samples_file(args)?;
+    let files = &args.output;
     let outputs = Outputs::new(
-        &[&args.output.json, &args.output.csv, &args.output.latex, &args.output.report, &args.output.rrd],
+        &[&files.json, &files.csv, &files.latex, &files.report, &files.rrd, &samples],
         &args.evaluation.files(),
     )?;
     if args.output.rrd.is_some() && !cfg!(feature = "rerun") {
         return Err(usage("--rrd: this vice was built without Rerun; build it with `--features rerun`"));
     }
     let shown = args.output.report.is_some() || args.output.rrd.is_some();
-    let samples = samples_file(args)?;
     let scoring = Scoring {
         subsets: args.scoring.subsets.iter().map(|n| usize::from(*n)).collect(),
         align: args.scoring.align,
@@ -158,14 +159,7 @@ fn samples_file(args: &Args) -> anyhow::Result<Option<PathBuf>> {
         ));
     }
     match &args.output.json {
-        Some(json) if json.as_os_str() != "-" => {
-            let path = json.with_extension("samples.jsonl");
-            Outputs::new(
-                &[&Some(path.clone()), &args.output.csv, &args.output.latex],
-                &args.evaluation.files(),
-            )?;
-            Ok(Some(path))
-        }
+        Some(json) if json.as_os_str() != "-" => Ok(Some(json.with_extension("samples.jsonl"))),
         _ => Err(usage("--samples jsonl writes beside the JSON: name a file with --json")),
     }
 }

@@ -93,7 +93,8 @@ fn open(
     let settings = &document.settings;
     let path = moved.cloned().or_else(|| settings.dataset.as_ref().map(PathBuf::from));
     let path = path.ok_or_else(|| anyhow::anyhow!("the result does not say where its data set is"))?;
-    let known = formats::registry(plugins)?.by_name(&document.dataset.format).is_ok();
+    let registry = formats::registry(plugins)?;
+    let known = registry.by_name(&document.dataset.format).is_ok();
     let set = |(key, value): (&String, &String)| Some((key.strip_prefix("set ")?.to_string(), value.clone()));
     let args = DatasetArgs {
         path,
@@ -102,5 +103,5 @@ fn open(
         camera: None,
         plugins: plugins.clone(),
     };
-    args.open()
+    args.open_in(&registry)
 }
