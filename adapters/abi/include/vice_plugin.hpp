@@ -192,6 +192,13 @@ Holder<T> *hold(T value) {
 // As void* so that release can go back the same way.
 inline void *token(Owner *owner) { return owner; }
 
+// A list, with what it lies in until it is released.
+template <class List, class T>
+void give(List *out, std::vector<T> values) {
+    auto *held = hold(std::move(values));
+    *out = {held->value.data(), held->value.size(), token(held)};
+}
+
 struct OpenDataset {
     std::unique_ptr<Dataset> dataset;
     std::string name;
@@ -297,8 +304,7 @@ struct Export {
         return guard(message, [&] {
             OpenDataset &d = of(dataset);
             d.check_camera(index);
-            auto *held = hold(d.dataset->frames_ns(index));
-            *out = {held->value.data(), held->value.size(), token(held)};
+            give(out, d.dataset->frames_ns(index));
             return VICE_OK;
         });
     }
@@ -331,8 +337,7 @@ struct Export {
         return guard(message, [&] {
             OpenDataset &d = of(dataset);
             d.check_stream(index);
-            auto *held = hold(d.dataset->trajectory(index));
-            *out = {held->value.data(), held->value.size(), token(held)};
+            give(out, d.dataset->trajectory(index));
             return VICE_OK;
         });
     }
@@ -342,16 +347,14 @@ struct Export {
         return guard(message, [&] {
             OpenDataset &d = of(dataset);
             d.check_stream(index);
-            auto *held = hold(d.dataset->relative_motions(index));
-            *out = {held->value.data(), held->value.size(), token(held)};
+            give(out, d.dataset->relative_motions(index));
             return VICE_OK;
         });
     }
 
     static std::int32_t imu(void *dataset, vice_imu_samples *out, vice_message *message) noexcept {
         return guard(message, [&] {
-            auto *held = hold(of(dataset).dataset->imu());
-            *out = {held->value.data(), held->value.size(), token(held)};
+            give(out, of(dataset).dataset->imu());
             return VICE_OK;
         });
     }

@@ -5,7 +5,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use serde_json::Value;
-use vice_tests::{root, shared, shared_json, vice};
+use vice_tests::{Run, root, shared, shared_json, vice};
 
 /// The example as a library, built once.
 fn library() -> &'static Path {
@@ -30,6 +30,15 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
+/// Evaluates a sequence with its own labels, ground truth and depth images.
+fn evaluate(dataset: &Path, more: &[&str]) -> Run {
+    let labels = dataset.join("labels.csv");
+    let mut args = vec!["evaluate", text(dataset), "--plugin", text(library()), "--labels", text(&labels)];
+    args.extend(["--estimate", "ground-truth", "--depth", "zcam"]);
+    args.extend(more);
+    vice(&args)
+}
+
 fn px(value: &Value) -> [f64; 2] {
     [value[0].as_f64().unwrap(), value[1].as_f64().unwrap()]
 }
@@ -42,23 +51,7 @@ fn plugin_in_cpp_agrees_with_the_oracle() {
     };
     let folder = tempfile::tempdir().unwrap();
     let json = folder.path().join("out.json");
-    let labels = dataset.join("labels.csv");
-    let run = vice(&[
-        "evaluate",
-        text(&dataset),
-        "--plugin",
-        text(library()),
-        "--labels",
-        text(&labels),
-        "--estimate",
-        "ground-truth",
-        "--depth",
-        "zcam",
-        "--subsets",
-        "1,2,3,4",
-        "--json",
-        text(&json),
-    ]);
+    let run = evaluate(&dataset, &["--subsets", "1,2,3,4", "--json", text(&json)]);
     assert_eq!(run.code, 0, "{}", run.stderr);
     let document: Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
     let part = &document["pixel"][0];
@@ -90,10 +83,10 @@ fn plugin_in_cpp_passes_the_check() {
     assert_eq!(run.code, 0, "{}\n{}", run.stdout, run.stderr);
 }
 
-/// A copy of the sequence's text files, with the images where they were.
+/// A copy of the sequence, one of its text files changed.
 fn copy_with(dataset: &Path, name: &str, change: impl Fn(String) -> String) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    for file in ["rgb.txt", "depth.txt", "groundtruth.txt", "camera.json"] {
+    for file in ["rgb.txt", "depth.txt", "groundtruth.txt", "camera.json", "labels.csv"] {
         let whole = std::fs::read_to_string(dataset.join(file)).unwrap();
         let whole = if file == name { change(whole) } else { whole };
         std::fs::write(folder.path().join(file), whole).unwrap();
@@ -111,7 +104,6 @@ fn copy_with(dataset: &Path, name: &str, change: impl Fn(String) -> String) -> t
 #[test]
 fn plugin_in_cpp_names_the_line_at_fault() {
     let Some(dataset) = shared("data/tum_rgbd5") else { return };
-    let labels = dataset.join("labels.csv");
     type Change<'a> = &'a dyn Fn(String) -> String;
     let cases: [(&str, Change<'_>, &str); 5] = [
         ("rgb.txt", &|t| t.replace("1700000001.000000 ", "1.7e9 "), "rgb.txt:5: `1.7e9` is no stamp"),
@@ -126,18 +118,7 @@ fn plugin_in_cpp_names_the_line_at_fault() {
     ];
     for (file, change, expected) in cases {
         let broken = copy_with(&dataset, file, change);
-        let run = vice(&[
-            "evaluate",
-            text(broken.path()),
-            "--plugin",
-            text(library()),
-            "--labels",
-            text(&labels),
-            "--estimate",
-            "ground-truth",
-            "--depth",
-            "zcam",
-        ]);
+        let run = evaluate(broken.path(), &[]);
         assert_eq!(run.code, 1, "{file}: {}", run.stdout);
         assert!(run.stderr.contains(expected), "{file}: {}", run.stderr);
     }
@@ -150,19 +131,7 @@ fn plugin_in_cpp_survives_a_damaged_image() {
     let image = broken.path().join("depth/1700000000.000000.png");
     let whole = std::fs::read(&image).unwrap();
     std::fs::write(&image, &whole[..whole.len() / 2]).unwrap();
-    let labels = dataset.join("labels.csv");
-    let run = vice(&[
-        "evaluate",
-        text(broken.path()),
-        "--plugin",
-        text(library()),
-        "--labels",
-        text(&labels),
-        "--estimate",
-        "ground-truth",
-        "--depth",
-        "zcam",
-    ]);
+    let run = evaluate(broken.path(), &[]);
     assert_ne!(run.code, 0, "{}", run.stdout);
     assert!(run.stderr.contains("the PNG breaks off or is damaged"), "{}", run.stderr);
 }
