@@ -254,22 +254,42 @@ impl ResultDocument {
         self.trajectory.iter_mut().for_each(|t| t.frames.clear());
     }
 
-    /// Largest share of labels that could not be scored, over all parts, in percent. What a human left out, by a mark or by asking for
-    /// manual labels only, does not count.
+    /// Largest [`PixelPart::skipped_percent`] of all parts.
     pub fn worst_skipped_percent(&self) -> f64 {
         self.pixel.iter().map(PixelPart::skipped_percent).fold(0.0, f64::max)
     }
 }
 
+/// Whether this is the reason of a label whose point a stream carried out of the camera's reach.
+fn carried_away(reason: &str) -> bool {
+    [crate::evaluate::BEHIND_CAMERA, crate::evaluate::OUTSIDE_MODEL].contains(&reason)
+}
+
 impl PixelPart {
     /// Share of labels that could not be scored, in percent. Where nothing was scored it is 100, whatever the reason.
+    ///
+    /// Not counted is what somebody left out on purpose, and what an estimate carried out of view: that is a finding
+    /// about the estimate, not a gap in the data ([`PixelPart::carried_away_percent`]).
     pub fn skipped_percent(&self) -> f64 {
         if self.scored == 0 {
             return 100.0;
         }
-        let wanted = [crate::evaluate::OCCLUDED, crate::evaluate::NOT_MANUAL];
-        let skipped = self.skipped.iter().filter(|s| !wanted.contains(&s.reason.as_str())).count() as f64;
+        let skipped = self.skipped_for(|reason| {
+            let wanted = [crate::evaluate::OCCLUDED, crate::evaluate::NOT_MANUAL];
+            !(wanted.contains(&reason) || self.role == Role::Estimate && carried_away(reason))
+        });
         100.0 * skipped / (skipped + self.scored as f64)
+    }
+
+    /// Share of labels, in percent of these and the scored ones, whose point the stream carried behind the camera or out
+    /// of its model's reach: no pixel can be compared there, and the RMSE is over the rest.
+    pub fn carried_away_percent(&self) -> f64 {
+        let away = self.skipped_for(carried_away);
+        if away == 0.0 { 0.0 } else { 100.0 * away / (away + self.scored as f64) }
+    }
+
+    fn skipped_for(&self, counts: impl Fn(&str) -> bool) -> f64 {
+        self.skipped.iter().filter(|s| counts(&s.reason)).count() as f64
     }
 
     /// Number of skipped labels by reason, sorted by reason.

@@ -40,7 +40,7 @@ struct ScoringArgs {
     /// Alignment of the trajectory errors: none, first-pose, yaw, se3, sim3.
     #[arg(long, value_name = "HOW", default_value = "se3")]
     align: Alignment,
-    /// Exit with 3 if more labels than this could not be scored, percent.
+    /// Exit with 3 if more labels than this could not be scored, percent. What an estimate carries behind the camera is warned of instead.
     #[arg(long, value_name = "PERCENT", default_value = "10", value_parser = percent)]
     max_skipped: f64,
 }
@@ -136,6 +136,16 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         args.output.json.as_ref().map_or(Ok(false), |path| outputs.write_json(path, &document))?;
     if !(outputs.write(&texts)? || json_printed) {
         terminal::print(&report::table::render(&document))?;
+    }
+    for part in &document.pixel {
+        let away = part.carried_away_percent();
+        if away > args.scoring.max_skipped {
+            tracing::warn!(
+                "{} ({} depth) carries {away:.1} % of the labels' points behind the camera or beyond its model: RMSE_2D is of the rest",
+                part.stream,
+                part.depth
+            );
+        }
     }
     let worst = document.worst_skipped_percent();
     if worst > args.scoring.max_skipped {

@@ -39,6 +39,12 @@ pub const OCCLUDED: &str = "occluded";
 /// The reason of labels that a machine made where only manual ones were asked for: not counted against the run either.
 pub const NOT_MANUAL: &str = "not-manual";
 
+/// The reason of a label whose point was carried behind the camera.
+pub const BEHIND_CAMERA: &str = "behind-camera";
+
+/// The reason of a label whose point was carried further to the side than the distortion model reaches.
+pub const OUTSIDE_MODEL: &str = "outside-model";
+
 /// Why a label was not scored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
@@ -88,8 +94,8 @@ impl SkipReason {
             Self::BeforeStream => "before-stream",
             Self::AfterStream => "after-stream",
             Self::NoExtrinsics => "no-extrinsics",
-            Self::BehindCamera => "behind-camera",
-            Self::OutsideModel => "outside-model",
+            Self::BehindCamera => BEHIND_CAMERA,
+            Self::OutsideModel => OUTSIDE_MODEL,
             Self::NoDepth(miss) => match miss {
                 DepthMiss::NoAnchor => "keyframe-no-anchor",
                 DepthMiss::AboveHorizon => "keyframe-above-horizon",

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::camera::Model;
 use crate::dataset::Image;
-use crate::frames::{Rigid, World, WorldFromBody};
+use crate::frames::{Body, Rigid, World, WorldFromBody};
 use crate::label::{LabelRow, LabelSet, Observation, ObservationSource};
 use crate::result::Role;
 use crate::trajectory::{Trajectory, in_other_world};
@@ -195,6 +195,26 @@ fn gaps_are_counted_with_their_reason_and_a_gap_at_a_key_frame_skips_its_segment
     assert_eq!((sparse.scored, sparse.pooled_rmse_px, sparse.skipped.len()), (0, None, 152));
     assert_eq!(sparse.skipped_percent(), 100.0);
     assert!(sparse.rmse_px.values().all(Option::is_none));
+}
+
+#[test]
+fn points_carried_behind_the_camera_are_a_finding_about_an_estimate() {
+    let about_x = UnitQuaternion::from_euler_angles(std::f64::consts::PI, 0.0, 0.0);
+    let half_turn: Rigid<Body, Body> = Rigid::from_parts(Vector3::zeros(), about_x);
+    let turned = (0..FRAMES).map(|i| {
+        let pose = world_from_body(i);
+        (stamp(i), if i % 2 == 1 { pose * half_turn } else { pose })
+    });
+    let turned = Trajectory::from_poses(turned).unwrap();
+    let part = |role| {
+        run(&labels(&flyer()), &[stream(role, turned.clone())], Window::default()).unwrap().pixel.remove(0)
+    };
+    for (role, percent) in [(Role::Estimate, 0.0), (Role::Reference, 100.0 * 80.0 / 152.0)] {
+        let part = part(role);
+        assert_eq!(part.skips_by_reason().into_iter().collect::<Vec<_>>(), [("behind-camera", 80)]);
+        assert!((part.carried_away_percent() - 100.0 * 80.0 / 152.0).abs() < 1e-9);
+        assert!((part.skipped_percent() - percent).abs() < 1e-9, "{role:?}: {}", part.skipped_percent());
+    }
 }
 
 #[test]
