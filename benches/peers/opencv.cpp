@@ -1,6 +1,6 @@
 // Times OpenCV from C++, one JSON line a case: what a user would call instead, in one thread.
 //
-// usage: peer POINTS
+// usage: peer POINTS BEFORE.raw AFTER.raw (two pictures of 752x480 bytes)
 // build: c++ -O3 -march=native opencv.cpp -lopencv_calib3d -lopencv_video -lopencv_imgproc -lopencv_core
 #include <chrono>
 #include <cstdio>
@@ -27,6 +27,17 @@ static double best_seconds(int runs, const std::function<void()>& work) {
 
 static void emit(const char* name, std::size_t n, double seconds) {
     std::printf("{\"name\": \"%s\", \"n\": %zu, \"seconds\": %.9g}\n", name, n, seconds);
+}
+
+static cv::Mat picture(const char* path) {
+    cv::Mat image(480, 752, CV_8U);
+    std::FILE* file = std::fopen(path, "rb");
+    if (!file || std::fread(image.data, 1, image.total(), file) != image.total()) {
+        std::fprintf(stderr, "%s cannot be read\n", path);
+        std::exit(1);
+    }
+    std::fclose(file);
+    return image;
 }
 
 int main(int count, char** arguments) {
@@ -61,18 +72,13 @@ int main(int count, char** arguments) {
     }));
 
     // A textured picture and itself a little further: 500 corners, 21x21 windows, three levels above the picture.
-    cv::Mat noise(480, 752, CV_8U), before, after;
-    cv::theRNG().state = 7;
-    cv::randu(noise, 0, 256);
-    cv::GaussianBlur(noise, before, cv::Size(0, 0), 2.0);
-    cv::normalize(before, before, 0, 255, cv::NORM_MINMAX);
-    const cv::Mat shift = (cv::Mat_<double>(2, 3) << 1, 0, 3.3, 0, 1, -2.4);
-    cv::warpAffine(before, after, shift, before.size());
+    if (count < 4) return 0;
+    const cv::Mat before = picture(arguments[2]), after = picture(arguments[3]);
     std::vector<cv::Point2f> corners, found;
     cv::goodFeaturesToTrack(before, corners, 500, 0.01, 8);
     std::vector<unsigned char> status;
     std::vector<float> error;
-    emit("pyrlk", corners.size(), best_seconds(5, [&] {
+    emit("pyrlk", corners.size(), best_seconds(10, [&] {
         cv::calcOpticalFlowPyrLK(before, after, corners, found, status, error, cv::Size(21, 21), 3);
     }));
 }

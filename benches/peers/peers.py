@@ -1,6 +1,6 @@
 """Times OpenCV with NumPy, SciPy, plyfile and evo, one JSON line a case, in one thread.
 
-usage: peers.py POINTS CLOUD.ply REFERENCE.tum ESTIMATE.tum
+usage: peers.py POINTS CLOUD.ply REFERENCE.tum ESTIMATE.tum BEFORE.raw AFTER.raw
 What cannot be imported is said in a line of its own, and its cases are left out.
 """
 import json
@@ -50,6 +50,20 @@ def opencv(n):
     emit("track", n, best_seconds(1, lambda: project(np.c_[unproject(), np.ones(n)] * depths[:, None])))
 
 
+def tracker(before, after):
+    import cv2
+    import numpy as np
+
+    cv2.setNumThreads(1)
+    before, after = (np.fromfile(path, np.uint8).reshape(480, 752) for path in (before, after))
+    corners = cv2.goodFeaturesToTrack(before, 500, 0.01, 8)
+
+    def flow():
+        return cv2.calcOpticalFlowPyrLK(before, after, corners, None, winSize=(21, 21), maxLevel=3)
+
+    emit("pyrlk", len(corners), best_seconds(10, flow))
+
+
 def ply(path):
     import numpy as np
     from plyfile import PlyData
@@ -58,7 +72,9 @@ def ply(path):
         vertex = PlyData.read(path)["vertex"]
         return [np.asarray(vertex[k]) for k in "xyz"]
 
-    emit("ply", len(read()[0]), best_seconds(3, read))
+    n = len(read()[0])
+    emit("ply mapped", n, best_seconds(3, read))
+    emit("ply", n, best_seconds(3, lambda: np.stack(read(), axis=1).astype(float)))
 
 
 def zmap(path):
@@ -101,12 +117,13 @@ def trajectory(reference, estimate):
 
 
 def main():
-    n, cloud, reference, estimate = int(sys.argv[1]), sys.argv[2], sys.argv[3], sys.argv[4]
+    n, (cloud, reference, estimate, *pictures) = int(sys.argv[1]), sys.argv[2:]
     for case, arguments in (
         (opencv, [n]),
         (ply, [cloud]),
         (zmap, [cloud]),
         (trajectory, [reference, estimate]),
+        (tracker, pictures),
     ):
         try:
             case(*arguments)

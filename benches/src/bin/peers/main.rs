@@ -14,6 +14,7 @@
 
 mod files;
 mod programs;
+mod sizes;
 mod table;
 
 use std::error::Error;
@@ -61,13 +62,13 @@ fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
     for round in 0..options.rounds {
         eprintln!("round {} of {}", round + 1, options.rounds);
         rounds.start();
-        peers.cpp(options.points, &mut rounds)?;
+        peers.cpp(options.points, &files, &mut rounds)?;
         ours.kernels(options.points, &mut rounds)?;
         ours.depth(&files, &mut rounds)?;
+        ours.tracker(&files, &mut rounds)?;
         peers.python(options.points, &files, &mut rounds)?;
         ours.trajectory(&files, &mut rounds)?;
         peers.evo(&files, &mut rounds)?;
-        ours.sizes(&mut rounds)?;
     }
     let text = rounds.render(options.points, &peers.missing);
     println!("{text}");

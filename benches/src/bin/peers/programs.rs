@@ -1,19 +1,27 @@
 //! Runs both sides.
 
+use std::collections::BTreeSet;
 use std::error::Error;
 use std::ffi::OsString;
+use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::Value;
-use vice_core::camera::{Camera, Model};
+use vice_annotate::tracker::{Pyramid, corners, track_translation};
+use vice_core::camera::{Camera, Model, Pixel};
 use vice_core::frames::{Rigid, WorldFromCamera};
 use vice_depth::{Cloud, CloudOptions, ZMapDepth, ZMapOptions, depth_image, read_ply_points};
 
 use crate::files::{Files, POSES, SCAN_POINTS};
 use crate::table::{Rounds, Side};
+
+/// Corners that are tracked, at most.
+const CORNERS: usize = 500;
+/// Levels of a pyramid above the picture.
+const LEVELS: usize = 3;
 
 type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
 
@@ -52,23 +60,30 @@ impl Ours {
         Ok(serde_json::from_slice(&output.stdout)?)
     }
 
-    /// Projection, undistortion and equation 1 with the lens of EuRoC, one thread and two.
+    /// Projection, undistortion and equation 1 with the lens of EuRoC in one thread, and the same at several sizes with one
+    /// and two.
     pub(crate) fn kernels(&self, points: usize, rounds: &mut Rounds) -> Result<()> {
-        let n = points.to_string();
-        let names = ["project", "unproject", "track"];
-        let arguments = ["--model", "radtan", "--points", &n];
-        for threads in ["1", "2"] {
-            let document = self.bench(&[&names[..], &arguments, &["--threads", threads]].concat())?;
-            for result in document["results"].as_array().into_iter().flatten() {
-                let name = result["kernel"].as_str().unwrap_or_default();
-                let per_second = result["points_per_second"].as_f64().unwrap_or(f64::NAN);
-                let side = if threads == "1" { Side::Ours } else { Side::TwoThreads };
-                rounds.add(side, name, points, points as f64 / per_second);
-                if threads == "1" {
-                    rounds.limit(name, result["fraction_of_limit"].as_f64().unwrap_or(f64::NAN));
+        let mut sizes = BTreeSet::from([100_000, 1_000_000, 10_000_000]);
+        sizes.insert(points);
+        for size in sizes {
+            for threads in [1, 2] {
+                let (n, t) = (size.to_string(), threads.to_string());
+                let kernels =
+                    ["project", "unproject", "track", "--model", "radtan", "--points", &n, "--threads", &t];
+                let document = self.bench(&kernels)?;
+                for result in document["results"].as_array().into_iter().flatten() {
+                    let name = result["kernel"].as_str().unwrap_or_default();
+                    let number = |field: &str| result[field].as_f64().unwrap_or(f64::NAN);
+                    let (per_second, fraction) = (number("points_per_second"), number("fraction_of_limit"));
+                    rounds.sizes.add(name, size, threads, per_second, fraction);
+                    if threads == 1 && size == points {
+                        rounds.add(Side::Ours, name, points, points as f64 / per_second);
+                    }
+                }
+                if size == points {
+                    rounds.machine(&document["machine"][0]);
                 }
             }
-            rounds.machine(&document["machine"][0]);
         }
         // OpenCV's projection moves the points too, which is one more kernel here, timed in this process.
         let seconds = vice_benches::in_one_thread(|| vice_benches::project_moved_seconds(points))?;
@@ -76,19 +91,22 @@ impl Ours {
         Ok(())
     }
 
-    /// The cost of a point from what fits the caches to what does not.
-    pub(crate) fn sizes(&self, rounds: &mut Rounds) -> Result<()> {
-        for points in [100_000, 1_000_000, 10_000_000] {
-            let n = points.to_string();
-            let names = ["project", "unproject", "track"];
-            let arguments = ["--model", "radtan", "--threads", "1", "--points", &n];
-            let document = self.bench(&[&names[..], &arguments].concat())?;
-            for result in document["results"].as_array().into_iter().flatten() {
-                let name = result["kernel"].as_str().unwrap_or_default();
-                let per_second = result["points_per_second"].as_f64().unwrap_or(f64::NAN);
-                rounds.size(name, points, 1e9 / per_second);
-            }
-        }
+    /// Corners of a picture found again in the next, from the two pictures to the places.
+    pub(crate) fn tracker(&self, files: &Files, rounds: &mut Rounds) -> Result<()> {
+        let (corners, seconds) = vice_benches::in_one_thread(|| -> Result<(usize, f64)> {
+            let pyramids = || -> Result<_> {
+                Ok((Pyramid::new(&files.before, LEVELS)?, Pyramid::new(&files.after, LEVELS)?))
+            };
+            let found = corners(&pyramids()?.0, 8.0);
+            let places: Vec<Pixel> = found.iter().take(CORNERS).map(|c| c.px).collect();
+            let seconds = best(10, || {
+                let (before, after) = pyramids()?;
+                black_box(track_translation(&before, &after, &places));
+                Ok(())
+            })?;
+            Ok((places.len(), seconds))
+        })??;
+        rounds.add(Side::Ours, "pyrlk", corners, seconds);
         Ok(())
     }
 
@@ -161,16 +179,18 @@ impl Peers {
         Self { cpp, python, evo, missing }
     }
 
-    pub(crate) fn cpp(&self, points: usize, rounds: &mut Rounds) -> Result<()> {
+    pub(crate) fn cpp(&self, points: usize, files: &Files, rounds: &mut Rounds) -> Result<()> {
         let Some(program) = &self.cpp else { return Ok(()) };
-        lines(Command::new(program).arg(points.to_string()), Side::Cpp, rounds)
+        let mut command = Command::new(program);
+        lines(command.arg(points.to_string()).args(&files.pictures), Side::Cpp, rounds)
     }
 
     pub(crate) fn python(&self, points: usize, files: &Files, rounds: &mut Rounds) -> Result<()> {
         let Some(python) = &self.python else { return Ok(()) };
         let mut command = python_command(python);
         command.args(["-c", include_str!("../../../peers/peers.py"), &points.to_string()]);
-        lines(command.args([&files.scan, &files.reference, &files.estimate]), Side::Python, rounds)
+        command.args([&files.scan, &files.reference, &files.estimate]).args(&files.pictures);
+        lines(&mut command, Side::Python, rounds)
     }
 
     /// The whole command, process start and reading included.

@@ -7,11 +7,12 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use crate::sizes::Sizes;
+
 /// Who was timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Side {
     Ours,
-    TwoThreads,
     Cpp,
     Python,
 }
@@ -35,7 +36,7 @@ const fn row(
     Row { case, ours: (Side::Ours, ours), theirs, what, goal }
 }
 
-const ROWS: [Row; 11] = [
+const ROWS: [Row; 14] = [
     row(
         "project, radtan",
         "project",
@@ -88,7 +89,28 @@ const ROWS: [Row; 11] = [
         None,
     ),
     row("whole depth image of a scan", "zmap", (Side::Python, "zmap"), "SciPy `LinearNDInterpolator`", None),
-    row("reading a binary PLY", "ply", (Side::Python, "ply"), "plyfile", None),
+    row(
+        "reading a binary PLY",
+        "ply",
+        (Side::Python, "ply"),
+        "plyfile, copied into an array of doubles",
+        None,
+    ),
+    row("the same", "ply", (Side::Python, "ply mapped"), "plyfile, mapped and not yet read", None),
+    row(
+        "tracking a corner, 21x21",
+        "pyrlk",
+        (Side::Cpp, "pyrlk"),
+        "C++ `cv::calcOpticalFlowPyrLK`",
+        Some(1.0),
+    ),
+    row(
+        "tracking a corner, 21x21",
+        "pyrlk",
+        (Side::Python, "pyrlk"),
+        "Python `cv2.calcOpticalFlowPyrLK`",
+        Some(1.0),
+    ),
 ];
 
 /// Points of a case and its time in each round.
@@ -99,8 +121,7 @@ type Times = BTreeMap<(Side, String), (usize, Vec<Option<f64>>)>;
 pub(crate) struct Rounds {
     count: usize,
     times: Times,
-    limits: BTreeMap<String, Vec<f64>>,
-    sizes: BTreeMap<String, BTreeMap<usize, f64>>,
+    pub(crate) sizes: Sizes,
     machines: BTreeMap<u64, [f64; 3]>,
 }
 
@@ -115,17 +136,6 @@ impl Rounds {
         *points = n;
         times.resize(self.count, None);
         times[self.count - 1] = Some(seconds);
-    }
-
-    /// How near a kernel of ours comes to the machine's limit.
-    pub(crate) fn limit(&mut self, name: &str, fraction: f64) {
-        self.limits.entry(name.to_string()).or_default().push(fraction);
-    }
-
-    /// The best cost of a point at a size, nanoseconds.
-    pub(crate) fn size(&mut self, name: &str, points: usize, nanoseconds: f64) {
-        let best = self.sizes.entry(name.to_string()).or_default().entry(points).or_insert(f64::INFINITY);
-        *best = best.min(nanoseconds);
     }
 
     /// The machine's limits with a number of threads; the best of the rounds.
@@ -183,31 +193,7 @@ impl Rounds {
                 row.goal.map_or_else(String::new, |g| g.to_string()),
             );
         }
-        text.push_str("\n| kernel | part of the machine's limit | two threads against one (asked 1.8) | ns a point at 1e5, 1e6, 1e7 | dearest by cheapest (asked 1.5) |\n| --- | --- | --- | --- | --- |\n");
-        for (name, fractions) in &self.limits {
-            let mut fractions = fractions.clone();
-            fractions.sort_by(f64::total_cmp);
-            let sizes: Vec<f64> =
-                self.sizes.get(name).into_iter().flat_map(|s| s.values().copied()).collect();
-            let (least, most) =
-                sizes.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), v| (a.min(*v), b.max(*v)));
-            let listed: Vec<String> = sizes.iter().map(|v| significant(*v)).collect();
-            let _ = writeln!(
-                text,
-                "| {name} | {} | {} | {} | {:.2} |",
-                spread(&fractions),
-                spread(&self.ratios((Side::Ours, name), (Side::TwoThreads, name))),
-                listed.join(", "),
-                most / least,
-            );
-        }
-        if let Some(ns) = self.best_ns(Side::Cpp, "pyrlk") {
-            let _ = writeln!(
-                text,
-                "\n`cv::calcOpticalFlowPyrLK` (21x21, three levels more): {:.1} µs a corner.",
-                ns / 1e3
-            );
-        }
+        let _ = write!(text, "\n{}", self.sizes.render());
         text.push('\n');
         for (threads, [copy, sums, divisions]) in &self.machines {
             let _ = writeln!(
@@ -226,7 +212,7 @@ impl Rounds {
     }
 }
 
-fn significant(value: f64) -> String {
+pub(crate) fn significant(value: f64) -> String {
     if value < 10.0 {
         format!("{value:.2}")
     } else if value < 100.0 {
@@ -237,7 +223,7 @@ fn significant(value: f64) -> String {
 }
 
 /// The median of sorted values, and their range.
-fn spread(sorted: &[f64]) -> String {
+pub(crate) fn spread(sorted: &[f64]) -> String {
     match (sorted.first(), sorted.last()) {
         (Some(least), Some(most)) => {
             let middle = sorted[sorted.len() / 2];
