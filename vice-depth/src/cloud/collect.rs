@@ -148,6 +148,20 @@ impl PointSink for Collector {
         self.add(point)
     }
 
+    fn singles(&mut self, mut points: impl ExactSizeIterator<Item = [f32; 3]> + Clone) -> DataResult<()> {
+        let (start, count) = (self.points.len(), points.len());
+        if self.points.capacity() - start >= count {
+            self.points.extend(points.clone());
+            let added = self.points[start..].as_flattened();
+            if !added.iter().fold(false, |any, v| any | !v.is_finite()) {
+                self.offered += count as u64;
+                return Ok(());
+            }
+            self.points.truncate(start);
+        }
+        points.try_for_each(|point| self.single(point))
+    }
+
     fn double(&mut self, point: [f64; 3]) -> DataResult<()> {
         if self.points.is_empty() && point.iter().all(|v| v.is_finite()) {
             self.origin_m = point.map(f64::round);
@@ -212,6 +226,26 @@ mod tests {
         let stored = (0..).take_while(|i| collector.single([*i as f32; 3]).is_ok()).count() as u64;
         assert_eq!(stored, 1_000_000 / BYTES_PER_POINT);
         assert_eq!(collector.points.capacity() as u64, stored);
+    }
+
+    #[test]
+    fn blocks_of_points_are_stored_as_single_ones_are() {
+        let block = |bad: usize| {
+            (0..100_000_usize).map(move |i| if i == bad { [1.0, f32::INFINITY, 2.0] } else { [i as f32; 3] })
+        };
+        let (mut blocks, mut singles) =
+            [(); 2].map(|()| Collector::new(&options(None, 100_000_000)).unwrap()).into();
+        blocks.expect(250_000, Some(250_000)).unwrap();
+        for bad in [usize::MAX, 99_999, 7] {
+            blocks.singles(block(bad)).unwrap();
+            block(bad).for_each(|p| singles.single(p).unwrap());
+        }
+        assert!(blocks.points == singles.points && blocks.points.len() == 299_998);
+        let counts = |c: &Collector| (c.offered, c.left_out, c.first_left_out);
+        assert_eq!(
+            (counts(&blocks), counts(&singles)),
+            ((300_000, 2, Some(199_999)), (300_000, 2, Some(199_999)))
+        );
     }
 
     #[test]
