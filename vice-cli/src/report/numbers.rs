@@ -123,7 +123,7 @@ pub(crate) fn px(value: f64) -> String {
     if !value.is_finite() {
         return "more px than can be counted".to_string();
     }
-    format!("{:.*} px", super::rows::decimals(value), value)
+    format!("{} px", super::rows::pixels(value, super::rows::decimals(value)))
 }
 
 #[cfg(test)]

@@ -56,7 +56,13 @@ pub(crate) fn sizes(document: &ResultDocument) -> Vec<usize> {
 /// `mean±std` of a subset size.
 pub(crate) fn mean_and_deviation(part: Option<&PixelPart>, size: usize, plus_minus: &str) -> Option<String> {
     let rmse = part?.rmse_px.get(&size)?.as_ref()?;
-    Some(format!("{:.*}{plus_minus}{:.*}", decimals(rmse.mean), rmse.mean, decimals(rmse.mean), rmse.std))
+    let shown = |px| pixels(px, decimals(rmse.mean));
+    Some(format!("{}{plus_minus}{}", shown(rmse.mean), shown(rmse.std)))
+}
+
+/// Pixels with so many decimals. A lens model far outside of its image gives powers of ten, of which nobody reads the digits.
+pub(crate) fn pixels(px: f64, decimals: usize) -> String {
+    if px < 1e6 { format!("{px:.decimals$}") } else { format!("{px:.1e}") }
 }
 
 /// Enough decimals to see a good estimate, not more than labels are good for.
@@ -67,5 +73,17 @@ pub(crate) fn decimals(px: f64) -> usize {
         2
     } else {
         1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_are_short_however_far_out() {
+        assert_eq!(pixels(0.04551, decimals(0.04551)), "0.0455");
+        assert_eq!(pixels(98.098, 3), "98.098");
+        assert_eq!(pixels(179_799_286_189.4, 3), "1.8e11");
     }
 }

@@ -2,7 +2,7 @@
 
 use vice_core::result::ResultDocument;
 
-use super::rows::{mean_and_deviation, rows, sizes};
+use super::rows::{mean_and_deviation, pixels, rows, sizes};
 use crate::terminal::printable;
 
 /// The table, the pooled RMSE of each stream, and the skips.
@@ -71,7 +71,7 @@ fn pooled(document: &ResultDocument) -> String {
             printable(&part.stream),
             format!("{:?}", part.role).to_lowercase(),
             printable(&part.depth),
-            part.pooled_rmse_px.map_or_else(not_available, |v| format!("{v:.3}")),
+            part.pooled_rmse_px.map_or_else(not_available, |v| pixels(v, 3)),
             part.scored.to_string(),
             skipped,
         ]);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use maud::{Markup, html};
 use vice_core::result::{ResultDocument, Role};
 
-use crate::report::rows::{mean_and_deviation, rows, sizes};
+use crate::report::rows::{mean_and_deviation, pixels, rows, sizes};
 use crate::terminal::printable;
 
 const NOT_AVAILABLE: &str = "–";
@@ -84,7 +84,7 @@ pub(crate) fn scored(document: &ResultDocument) -> Markup {
                             td.t { (printable(&part.stream)) }
                             td.t { (role(part.role)) }
                             td.t { (printable(&part.depth)) }
-                            td { (part.pooled_rmse_px.map_or_else(|| NOT_AVAILABLE.to_string(), |v| format!("{v:.3}"))) }
+                            td { (part.pooled_rmse_px.map_or_else(|| NOT_AVAILABLE.to_string(), |v| pixels(v, 3))) }
                             td { (part.scored) }
                             td { (part.skipped.len()) }
                         }
