@@ -20,7 +20,8 @@ const UNCERTAIN: &str = "uncertain";
 /// [`DataError`] with the line for a missing column, a field that cannot be read, and as [`LabelSet::from_rows`].
 pub fn read_csv(bytes: &[u8]) -> DataResult<LabelSet> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
+    // The reader's own trimming of fields allocates a record anew for each line.
+    let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::Headers).comment(Some(b'#')).from_reader(bytes);
     let mut lines = Lines { bytes, counted: 0, line: 1 };
     let heading = csv.headers().map_err(|e| csv_error(&e))?.clone();
     let heading_line = lines.at_end_of_record(csv.position());
@@ -126,11 +127,11 @@ impl Columns {
     }
 
     fn point<'r>(&self, record: &'r csv::StringRecord) -> &'r str {
-        record.get(self.point).unwrap_or_default()
+        record.get(self.point).unwrap_or_default().trim()
     }
 
     fn observation(&self, record: &csv::StringRecord, line: u64) -> DataResult<Observation> {
-        let field = |column: usize| record.get(column).unwrap_or_default();
+        let field = |column: usize| record.get(column).unwrap_or_default().trim();
         let number = |column: usize, name: &str| {
             let text = field(column);
             text.parse::<f64>().map_err(|_| DataError::new(format!("{name}: `{text}` is no number")))
