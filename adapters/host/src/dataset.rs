@@ -5,7 +5,7 @@ use std::ffi::c_void;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
-use vice_abi::contract::{self, Message, Text};
+use vice_abi::contract::{self, Text};
 use vice_core::camera::Camera;
 use vice_core::dataset::{
     CloudRef, CloudSource, Dataset, DepthImage, Fact, Floor, Image, OpenOptions, Plane, Probe,
@@ -16,87 +16,10 @@ use vice_core::imu::{ImuSample, InertialState};
 use vice_core::time::Stamp;
 use vice_core::trajectory::Trajectory;
 
-use crate::border::{self, Fault, MessageBuffer};
+use crate::ask::{MISTAKE, ask, must};
+use crate::border::{self, Fault};
 use crate::library::Library;
 use crate::values;
-
-/// What stands with an error that breaks the contract, in place of a cause in the data.
-pub(crate) const MISTAKE: &str = "a mistake of the plugin";
-
-/// A structure that a call fills: valid when it is all zero.
-trait Answer {
-    fn owner(&self) -> *mut c_void;
-}
-
-macro_rules! answers {
-    ($($name:ident),*) => {$(
-        impl Answer for contract::$name {
-            fn owner(&self) -> *mut c_void {
-                self.owner
-            }
-        }
-    )*};
-}
-answers!(Probe, DatasetInfo, Stamps, Image, DepthImage, Poses, Motions, ImuSamples, Cloud, Facts);
-
-macro_rules! plain_answers {
-    ($($name:ty),*) => {$(
-        impl Answer for $name {
-            fn owner(&self) -> *mut c_void {
-                std::ptr::null_mut()
-            }
-        }
-    )*};
-}
-plain_answers!(contract::Camera, contract::Rigid, contract::InertialState, contract::Floor, *mut c_void);
-
-/// Makes one call: waits for its turn, calls, takes what is wanted out of the answer, and has the rest released.
-///
-/// `None` where the plugin says that there is none. `what` is what was asked for, in words.
-fn ask<T: Answer, R>(
-    library: &Library,
-    what: &dyn Fn() -> String,
-    call: impl FnOnce(*mut T, *mut Message) -> i32,
-    take: impl FnOnce(&T) -> Result<R, Fault>,
-) -> DataResult<Option<R>> {
-    let bug = |text: String| DataError::new(format!("{}: {text}", what())).at(&library.path).hint(MISTAKE);
-    let mut buffer = MessageBuffer::new();
-    let mut message = buffer.message();
-    // SAFETY: each answer is a structure of numbers and pointers, or a pointer.
-    let mut answer: T = unsafe { std::mem::zeroed() };
-    let turn = library.turn();
-    let code = call(&raw mut answer, &raw mut message);
-    match code {
-        contract::OK => {
-            let taken = take(&answer);
-            library.release(answer.owner());
-            drop(turn);
-            taken.map(Some).map_err(bug)
-        }
-        contract::NONE => Ok(None),
-        contract::ERROR => Err(match buffer.text(&message) {
-            // In the plugin's own words, as a built-in format would say it.
-            Some(text) => DataError::new(text),
-            None => bug("it failed and does not say why".to_string()),
-        }),
-        contract::EXCEPTION => Err(bug(buffer.text(&message).unwrap_or_else(|| "an exception".to_string()))),
-        code => Err(bug(format!("the call returned {code}, which is none of the contract's codes"))),
-    }
-}
-
-/// As [`ask`], where there must be an answer.
-fn must<T: Answer, R>(
-    library: &Library,
-    what: &dyn Fn() -> String,
-    call: impl FnOnce(*mut T, *mut Message) -> i32,
-    take: impl FnOnce(&T) -> Result<R, Fault>,
-) -> DataResult<R> {
-    ask(library, what, call, take)?.ok_or_else(|| {
-        DataError::new(format!("{}: the call returned VICE_NONE, which it must not", what()))
-            .at(&library.path)
-            .hint(MISTAKE)
-    })
-}
 
 /// Asks a plugin about a path.
 pub(crate) fn probe(library: &Library, path: &Path) -> DataResult<Probe> {

@@ -6,6 +6,7 @@
 //! binary       whether it is a library for this machine
 //! library      loading, and the table: versions, sizes, null pointers
 //! border       texts and lists read from the other side
+//! ask          one call: its turn, its code, its answer
 //! values       the contract's values as the core's, checked
 //! dataset      a data set of a plugin
 //! conformance  what an adapter is expected to do, as a suite that anyone can run
@@ -15,6 +16,7 @@
 //! hands over is validated before the core sees it, and calls of a plugin that is not thread-safe never overlap.
 //! Libraries are never unloaded: their thread-locals and static variables have destructors that would run later.
 
+mod ask;
 mod binary;
 mod border;
 pub mod conformance;

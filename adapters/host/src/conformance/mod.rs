@@ -18,7 +18,7 @@ use vice_core::dataset::{Dataset, DatasetFactory, OpenOptions};
 use vice_core::error::{DataError, one_line};
 use vice_core::time::Stamp;
 
-use crate::dataset::MISTAKE;
+use crate::ask::MISTAKE;
 use crate::library::Plugin;
 
 /// How a finding counts.
