@@ -44,6 +44,27 @@ function run(command, args) {
   assert.equal(status, 0, `${command} ${args.join(" ")}: ${error?.message ?? stderr}`);
 }
 
+/**
+ * The program, to its end.
+ * @param {string[]} args
+ */
+export function vice(args) {
+  return spawnSync(program(), args, { encoding: "utf8", maxBuffer: 256 * 1024 * 1024 });
+}
+
+/**
+ * A folder of the shared data, by default in `../shared`.
+ * @param {string} relative
+ * @returns {string | null} null where it is missing, which is said; with `VICE_REQUIRE_DATA=1` it fails instead
+ */
+export function shared(relative) {
+  const path = resolve(ROOT, process.env.VICE_SHARED ?? "../shared", relative);
+  if (existsSync(path)) return path;
+  assert.notEqual(process.env.VICE_REQUIRE_DATA, "1", `${path} is missing`);
+  console.log(`skipped: ${path} is missing (set VICE_SHARED to the folder of shared data)`);
+  return null;
+}
+
 /** @returns {string} a new folder that goes away with this process */
 export function scratch() {
   const folder = mkdtempSync(join(tmpdir(), "vice-browser-"));
@@ -280,7 +301,7 @@ export class Window {
     await this.page.waitForFunction(() => document.getElementById("saved")?.textContent === "All saved");
   }
 
-  /** @param {string} text that a note or a banner holds */
+  /** @param {string | RegExp} text that a note or a banner holds */
   async told(text) {
     await this.page.locator("#notes, #banners").getByText(text).first().waitFor();
   }

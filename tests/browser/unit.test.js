@@ -8,6 +8,7 @@ import { afterEach, beforeEach, test } from "node:test";
 Object.assign(globalThis, { location: { search: "?token=secret" } });
 const { View } = await import("../../vice-annotate/page/view.js");
 const { Labels } = await import("../../vice-annotate/page/labels.js");
+const { outcome } = await import("../../vice-annotate/page/jobs.js");
 const { Keys, nameOf } = await import("../../vice-annotate/page/keys.js");
 const { Images } = await import("../../vice-annotate/page/images.js");
 
@@ -66,24 +67,53 @@ test("a change is applied once and in order", () => {
 
 test("doubtful frames are found in both directions, whichever lane they are in", () => {
   const labels = new Labels(state([seen(2, { confidence: 0.3 }), seen(4), seen(18, { uncertain: true, confidence: null })]));
-  assert.deepEqual(labels.doubtfulFrom(1, 1), { place: 9, name: "1" });
-  assert.deepEqual(labels.doubtfulFrom(9, -1), { place: 1, name: "1" });
-  assert.equal(labels.doubtfulFrom(9, 1), null);
+  assert.deepEqual(labels.doubtfulFrom(1, 1, "1"), { place: 9, name: "1" });
+  assert.deepEqual(labels.doubtfulFrom(9, -1, "1"), { place: 1, name: "1" });
+  assert.equal(labels.doubtfulFrom(9, 1, "1"), null);
   assert.equal(labels.doubtfulCount, 2);
 });
 
 test("where tracking broke off inside the image is doubtful, a gap in a segment and the border are not", () => {
-  assert.deepEqual(new Labels(state([seen(2), seen(4)])).doubtfulFrom(0, 1), { place: 3, name: "1" });
+  assert.deepEqual(new Labels(state([seen(2), seen(4)])).doubtfulFrom(0, 1, "1"), { place: 3, name: "1" });
   assert.equal(new Labels(state([seen(2), seen(4)])).doubtfulCount, 1);
-  assert.equal(new Labels(state([seen(2), seen(8), seen(18)])).doubtfulFrom(0, 1), null);
-  assert.deepEqual(new Labels(state([seen(2), seen(8, { keyframe: true })])).doubtfulFrom(0, 1)?.place, 2);
+  assert.equal(new Labels(state([seen(2), seen(8), seen(18)])).doubtfulFrom(0, 1, "1"), null);
+  assert.deepEqual(new Labels(state([seen(2), seen(8, { keyframe: true })])).doubtfulFrom(0, 1, "1")?.place, 2);
   assert.equal(new Labels(state([seen(2), seen(4, { u: 637 })])).doubtfulCount, 0);
+  assert.equal(new Labels(state([seen(2, { source: "detected" }), seen(4, { source: "detected" })])).doubtfulCount, 0);
+  const placed = new Labels(state([seen(4, { source: "manual", confidence: null })]));
+  assert.equal(placed.doubtfulCount, 0, "it may not have been tracked yet");
+  placed.applyJob({ id: 1, kind: "track", points: ["1"], done: 1, total: 1, state: "done", ends: [{ point: "1", frame: 5, why: "lost", gap_s: 1 }] });
+  assert.equal(placed.doubtfulCount, 1, "now it has");
+});
+
+test("of several doubtful points in a frame one follows the other, then comes the next frame", () => {
+  const labels = new Labels(state([]));
+  labels.replace({ ...state([]), points: ["1", "2", "3"].map((name) => ({ name, observations: [seen(2), seen(4, { confidence: name === "2" ? 0.9 : 0.2 })] })) });
+  assert.deepEqual(labels.doubtfulFrom(0, 1, "3"), { place: 2, name: "1" });
+  assert.deepEqual(labels.doubtfulFrom(2, 1, "1"), { place: 2, name: "3" });
+  assert.deepEqual(labels.doubtfulFrom(2, 1, "3"), { place: 3, name: "1" }, "where all three are lost");
+  assert.deepEqual(labels.doubtfulFrom(2, -1, "3"), { place: 2, name: "1" });
+  assert.equal(labels.doubtfulFrom(2, -1, "1"), null);
+});
+
+test("what ended a track is told in the numbers that the page shows", () => {
+  const labels = new Labels(state([seen(0)]));
+  /** @type {any} */
+  const job = { id: 1, kind: "track", points: ["1", "2", "3"], done: 9, total: 9, state: "done", message: "", remarks: "1 frames could not be decoded",
+    ends: [{ point: "1", frame: 8, why: "lost", gap_s: 0.95 }, { point: "3", frame: 8, why: "lost", gap_s: 0.95 }, { point: "2", frame: 6, why: "left-image", gap_s: 0.05 }] };
+  const { kind, text } = outcome(job, labels, new Keys());
+  assert.equal(kind, "info");
+  assert.equal(text, "Tracked 1, 2, 3. 1, 3 lost at frame 5, 0.95 s from the image before it. 2 left the image at frame 4. 1 frames could not be decoded. N goes to the next of these frames.");
+  assert.match(outcome({ ...job, state: "failed", message: "no disk" }, labels, new Keys()).text, /failed: no disk/);
+  assert.equal(outcome({ ...job, state: "stopped" }, labels, new Keys()).text, "");
+  assert.equal(outcome({ ...job, kind: "detect", message: "nothing" }, labels, new Keys()).text, "nothing");
 });
 
 test("a respawn is offered after a lane that ended at the border, and not after one that ended inside", () => {
   assert.deepEqual(new Labels(state([seen(2, { u: 637 })])).goneAt(6), ["1"]);
   assert.deepEqual(new Labels(state([seen(2, { u: 637 })])).goneAt(2), []);
   assert.deepEqual(new Labels(state([seen(2, { u: 300 })])).goneAt(6), []);
+  assert.deepEqual(new Labels(state([seen(2, { u: 637, source: "detected" })])).goneAt(6), []);
   assert.deepEqual(new Labels(state([seen(2, { u: 637 }), seen(8)])).goneAt(6), []);
 });
 

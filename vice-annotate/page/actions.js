@@ -63,6 +63,7 @@ export class Actions {
     app.changed();
     // What runs on this point works from what has just been corrected.
     await app.session.stop([name]);
+    const goesOn = !app.observation && app.labels.lostAt(name, app.place);
     /** @type {Edit[]} */
     const edits = [{ op: "place", point: name, frame, ...pixel }];
     if (keyframe) edits.push({ op: "mark", point: name, frame, keyframe: true });
@@ -70,7 +71,8 @@ export class Actions {
     app.labels.hope(name, frame, null);
     app.changed();
     if (!done) return;
-    if (app.switches.retrack && app.labels.followedByAutomatic(name, frame)) {
+    // A point that was lost and is found again by hand goes on from here.
+    if (app.switches.retrack && (goesOn || app.labels.followedByAutomatic(name, frame))) {
       await app.session.track([name], frame, "forward", app.labels.nextFixed(name, frame)?.frame ?? null);
     }
   }
@@ -180,14 +182,24 @@ export class Actions {
     const { app } = this;
     const { frame } = app;
     try {
-      const list = await getSuggestions(frame, SUGGESTIONS);
+      const { suggestions: list, lie } = await getSuggestions(frame, SUGGESTIONS);
       app.suggested = { frame, list };
-      if (list.length === 0) this.tell("warning", "There is no good place to suggest in this frame.");
+      const caution = list.length === 0 ? "There is no good place to suggest in this frame." : this.#caution(lie);
+      if (caution) this.tell("warning", caution);
     } catch (error) {
       if (!(error instanceof ServerError)) throw error;
       this.tell("error", `No suggestions: ${error.message}`);
     }
     app.changed();
+  }
+
+  /** @param {import("./types.js").Suggestions["lie"]} lie @returns {string} */
+  #caution(lie) {
+    const { state } = this.app.labels;
+    if (lie === "any" && state.depth_known) return "No depth is known in this frame: a key frame set here is not scored. Try another frame.";
+    if (lie === "below-horizon") return "No scan or depth camera tells the floor from walls here: take those that lie on the floor.";
+    if (lie === "depth" && state.floor_suggestions) return "No good corner was found on the floor of this frame: these lie elsewhere.";
+    return "";
   }
 
   /** @param {number} index */
@@ -285,7 +297,7 @@ export class Actions {
     app.respawning = false;
     app.suggested = null;
     app.changed();
-    if ((await app.session.stop()) > 0) this.tell("info", "Tracking is stopped; what it found so far stays.");
+    if ((await app.session.stop()) > 0) this.tell("info", "Stopped. What tracking found so far stays; a search for targets leaves nothing.");
   }
 
   /** @param {"undo" | "redo"} which */

@@ -1,6 +1,6 @@
 // The server, as functions. Every request carries the token that stands in the page's address.
 
-/** @import {Change, Direction, Edit, Job, Projections, State, Suggestion} from "./types.js" */
+/** @import {Change, Direction, Edit, Job, Projections, State, Suggestions, Targets} from "./types.js" */
 
 const token = new URLSearchParams(location.search).get("token") ?? "";
 
@@ -80,11 +80,11 @@ export async function getProjections() {
 /**
  * @param {number} frame
  * @param {number} count
- * @returns {Promise<Suggestion[]>}
+ * @returns {Promise<Suggestions>}
  */
 export async function getSuggestions(frame, count) {
   const response = await send(`/api/suggestions?frame=${frame}&count=${count}`, { cache: "no-store" });
-  return (await response.json()).suggestions;
+  return response.json();
 }
 
 /**
@@ -114,8 +114,17 @@ export function postTrack(revision, request) {
   return post("/api/track", { revision, ...request });
 }
 
-/** @param {number | string} job */
-export async function stopTrack(job) {
+/**
+ * @param {number} revision
+ * @param {Targets} targets
+ * @returns {Promise<Job>}
+ */
+export function postDetect(revision, targets) {
+  return post("/api/detect", { revision, ...targets });
+}
+
+/** Of any kind. @param {number | string} job */
+export async function stopJob(job) {
   await send(`/api/track/${encodeURIComponent(job)}`, { method: "DELETE", headers: { "Content-Type": "application/json" } });
 }
 
@@ -138,14 +147,15 @@ export function postImport(format, body) {
 
 /**
  * Follows what other windows and running jobs do.
- * @param {{change: (change: Change) => void, job: (job: Job) => void, closed: () => void, lost: () => void,
- *   open: () => void}} on
+ * @param {{change: (change: Change) => void, job: (job: Job) => void, save: (problem: string | null) => void,
+ *   closed: () => void, lost: () => void, open: () => void}} on
  */
 export function follow(on) {
   const events = new EventSource(`/api/events?token=${encodeURIComponent(token)}`);
   events.addEventListener("open", () => on.open());
   events.addEventListener("change", (event) => on.change(JSON.parse(event.data)));
   events.addEventListener("job", (event) => on.job(JSON.parse(event.data)));
+  events.addEventListener("save", (event) => on.save(JSON.parse(event.data).save_problem));
   events.addEventListener("closed", () => {
     events.close();
     on.closed();

@@ -4,13 +4,14 @@
 /** @import {App} from "./app.js" */
 /** @import {Help} from "./help.js" */
 /** @import {Player} from "./player.js" */
+/** @import {Targets} from "./targets.js" */
 
 import { nameOf } from "./keys.js";
 
 const ZOOM_STEP = 1.4;
 const FAR = 10;
 const WRITES = new Set([
-  "new-point", "suggest", "respawn", "track-forward", "track-backward", "track-both", "track-all", "delete", "delete-after",
+  "new-point", "suggest", "targets", "respawn", "track-forward", "track-backward", "track-both", "track-all", "delete", "delete-after",
 ]);
 
 /**
@@ -18,10 +19,11 @@ const WRITES = new Set([
  * @param {Actions} actions
  * @param {Player} player
  * @param {Help} help
+ * @param {Targets} targets
  * @param {(kind: "info", text: string) => void} tell
  * @returns {Record<string, () => unknown>}
  */
-export function commands(app, actions, player, help, tell) {
+export function commands(app, actions, player, help, targets, tell) {
   const { view } = app.viewer;
   /** @param {"dots" | "loupe" | "follow" | "invert"} name */
   const toggle = (name) => () => {
@@ -51,6 +53,7 @@ export function commands(app, actions, player, help, tell) {
     "next-point": () => actions.otherPoint(1),
     "previous-point": () => actions.otherPoint(-1),
     suggest: () => actions.suggest(),
+    targets: () => app.writable && targets.show(),
     respawn: () => actions.respawn(),
     "track-forward": () => actions.track([app.selected], "forward"),
     "track-backward": () => actions.track([app.selected], "backward"),

@@ -25,6 +25,7 @@ const GROUPS = [
     ["next-point", "Next point", [")", "]"]],
     ["previous-point", "Previous point", ["(", "["]],
     ["suggest", "Suggest points", ["s"]],
+    ["targets", "Find tags or a chessboard", ["g"]],
     ["respawn", "Respawn: new key frame", ["r"]],
   ]],
   ["Move (or move the cursor)", [

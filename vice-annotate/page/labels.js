@@ -22,6 +22,8 @@ export class Labels {
     /** The number of doubtful frames, and the revision it was counted at. */
     this.counted = 0;
     this.countedAt = -1;
+    /** @type {Map<string, Set<number>>} the frames in which tracking lost a point, as far as this page heard of it */
+    this.lost = new Map();
     /** @type {Map<string, Pixel>} shown before the server has said yes; by point and frame */
     this.hopes = new Map();
     this.replace(state);
@@ -33,6 +35,7 @@ export class Labels {
     this.places = new Map(state.frames.map((each, place) => [each.frame, place]));
     this.lanes = new Map();
     for (const point of state.points) this.#index(point);
+    for (const job of state.jobs) this.#heardOf(job);
     this.hopes.clear();
     this.countedAt = -1;
   }
@@ -66,6 +69,16 @@ export class Labels {
     return "applied";
   }
 
+  /** @param {number} frame of the data set @returns {number} its place among the frames, or that of the nearest */
+  placeNear(frame) {
+    const { frames } = this.state;
+    let nearest = 0;
+    for (let place = 1; place < frames.length; place += 1) {
+      if (Math.abs(frames[place].frame - frame) < Math.abs(frames[nearest].frame - frame)) nearest = place;
+    }
+    return nearest;
+  }
+
   /** @param {Projections | null} projections */
   setProjections(projections) {
     this.projections = projections;
@@ -91,6 +104,18 @@ export class Labels {
     const at = jobs.findIndex((each) => each.id === job.id);
     if (at >= 0) jobs.splice(at, 1);
     if (job.state === "running") jobs.push(job);
+    this.#heardOf(job);
+  }
+
+  /** @param {Job} job */
+  #heardOf(job) {
+    for (const { point, frame, why } of job.ends ?? []) {
+      if (why !== "lost") continue;
+      const there = this.lost.get(point);
+      if (there) there.add(frame);
+      else this.lost.set(point, new Set([frame]));
+    }
+    this.countedAt = -1;
   }
 
   /** @returns {Job[]} */
@@ -198,7 +223,8 @@ export class Labels {
   goneAt(frame) {
     return this.names.filter((name) => {
       const last = this.lastUpTo(name, frame);
-      if (!last || last.frame === frame || last !== this.#observations(name).at(-1)) return false;
+      // A target's corners are found again where they are in sight: nobody need place them.
+      if (!last || last.source === "detected" || last.frame === frame || last !== this.#observations(name).at(-1)) return false;
       return this.#atBorder(last);
     });
   }
@@ -219,24 +245,34 @@ export class Labels {
     const { frames } = this.state;
     const before = place > 0 ? this.at(name, frames[place - 1].frame) : null;
     if (!before || this.at(name, frames[place].frame) || this.#atBorder(before)) return false;
+    // Where a person has placed a point it may not have been tracked from yet; a detector follows nothing.
+    const { frame } = frames[place];
+    const heard = [...(this.lost.get(name) ?? [])].some((each) => each > before.frame && each <= frame);
+    if (before.source !== "auto" && !heard) return false;
     // A gap in a segment is a frame that could not be decoded, or was deleted.
     const next = this.#observations(name).find((each) => each.frame > frames[place].frame);
     return next === undefined || next.keyframe;
   }
 
   /**
-   * The nearest frame before or after, not itself, with a doubtful observation, or where tracking broke off.
+   * The next doubtful observation, or place where tracking broke off: of the points after (before) this one in this frame,
+   * then in the frames after (before).
    * @param {number} place among the frames
    * @param {1 | -1} step
+   * @param {string} name
    * @returns {{place: number, name: string} | null}
    */
-  doubtfulFrom(place, step) {
-    const { frames, points } = this.state;
-    for (let at = place + step; at >= 0 && at < frames.length; at += step) {
-      for (const { name } of points) {
-        const observation = this.at(name, frames[at].frame);
-        if (observation ? this.doubtful(observation) : this.lostAt(name, at)) return { place: at, name };
-      }
+  doubtfulFrom(place, step, name) {
+    const names = step > 0 ? this.names : this.names.reverse();
+    const wanted = (/** @type {number} */ at) => (/** @type {string} */ each) => {
+      const observation = this.at(each, this.state.frames[at].frame);
+      return observation ? this.doubtful(observation) : this.lostAt(each, at);
+    };
+    const here = names.slice(names.indexOf(name) + 1).find(wanted(place));
+    if (names.includes(name) && here !== undefined) return { place, name: here };
+    for (let at = place + step; at >= 0 && at < this.state.frames.length; at += step) {
+      const there = names.find(wanted(at));
+      if (there !== undefined) return { place: at, name: there };
     }
     return null;
   }

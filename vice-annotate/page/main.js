@@ -13,12 +13,14 @@ import { Images } from "./images.js";
 import { Keys } from "./keys.js";
 import { Labels } from "./labels.js";
 import { Loupe } from "./loupe.js";
+import { outcome } from "./jobs.js";
 import { Notices } from "./notices.js";
 import { Panels } from "./panels.js";
 import { Player } from "./player.js";
 import { Session } from "./session.js";
 import { Status } from "./status.js";
 import { joinSwitches, speak } from "./switches.js";
+import { Targets } from "./targets.js";
 import { Timeline } from "./timeline.js";
 import { Viewer } from "./viewer.js";
 
@@ -34,7 +36,7 @@ function listener(app, status) {
     changed: () => app.changed(),
     tell,
     elsewhere: (change) => tell("info", `Changed in another window: ${change.label}`),
-    finished: (job) => finished(job),
+    finished: (job) => finished(app, job),
     connection: (state) => {
       status.connection = state;
       if (state === "open") {
@@ -48,10 +50,11 @@ function listener(app, status) {
   };
 }
 
-/** @param {Job} job */
-function finished(job) {
-  if (job.state === "failed") tell("error", `Tracking failed: ${job.message ?? "no reason given"}`);
-  else if (job.state === "done") tell("info", `Tracked ${job.points.join(", ")}${job.message ? `: ${job.message}` : ""}`);
+/** @param {App} app @param {Job} job */
+function finished(app, job) {
+  const { kind, text } = outcome(job, app.labels, app.keys);
+  if (text) tell(kind, text);
+  if (job.kind === "detect" && !app.labels.lanes.has(app.selected) && app.labels.names.length > 0) app.select(app.labels.names[0]);
 }
 
 async function open() {
@@ -87,7 +90,7 @@ async function open() {
   const status = new Status(app, player, actions, notices);
   const help = new Help(app.keys, () => showKeyHints(app));
   app.session = new Session(labels, listener(app, status));
-  const table = commands(app, actions, player, help, tell);
+  const table = commands(app, actions, player, help, new Targets(app), tell);
   listenToKeys(app, table);
   listenToButtons(app, table);
   showKeyHints(app);

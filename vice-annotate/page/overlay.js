@@ -7,6 +7,9 @@ import { DARK, DOUBT, LABEL_BLUE, pointColour, streamColour } from "./palette.js
 
 const TRAIL_FRAMES = 20;
 const TEXT = "600 12px system-ui, sans-serif";
+const TAG_HEIGHT = 17;
+/** With more points than this in a frame their crosses are small. */
+const MANY_POINTS = 12;
 
 /**
  * Strokes a path twice: dark and wide below, coloured above, so that it is seen on any image.
@@ -41,24 +44,49 @@ export function crossPath(x, y, inner, outer) {
 
 /**
  * @param {CanvasRenderingContext2D} context
- * @param {string} text
- * @param {number} x
- * @param {number} y
- * @param {string} colour
+ * @param {Tag} what
  */
-function tag(context, text, x, y, colour) {
+function tag(context, { text, x, y, colour }) {
   context.font = TEXT;
-  const width = context.measureText(text).width + 8;
-  const left = x + 9;
-  const top = y - 25;
+  const { left, top, width } = tagBox(context, text, x, y);
   context.fillStyle = DARK;
   context.beginPath();
-  context.roundRect(left, top, width, 17, 4);
+  context.roundRect(left, top, width, TAG_HEIGHT, 4);
   context.fill();
   context.fillStyle = colour;
   context.textBaseline = "middle";
   context.fillText(text, left + 4, top + 9);
 }
+
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {string} text
+ * @param {number} x
+ * @param {number} y
+ */
+function tagBox(context, text, x, y) {
+  context.font = TEXT;
+  return { left: x + 9, top: y - 25, width: context.measureText(text).width + 8 };
+}
+
+/**
+ * Of names that would hide each other, as on a board's corners, the first ones are shown.
+ * @param {CanvasRenderingContext2D} context
+ * @param {Tag[]} tags the most important one first
+ */
+function drawTags(context, tags) {
+  /** @type {{left: number, top: number, width: number}[]} */
+  const drawn = [];
+  for (const each of tags) {
+    const box = tagBox(context, each.text, each.x, each.y);
+    const hidden = drawn.some((other) => box.left < other.left + other.width && other.left < box.left + box.width && Math.abs(box.top - other.top) < TAG_HEIGHT);
+    if (hidden) continue;
+    drawn.push(box);
+    tag(context, each);
+  }
+}
+
+/** @typedef {{text: string, x: number, y: number, colour: string}} Tag a name beside a place on the screen */
 
 /**
  * @param {CanvasRenderingContext2D} context
@@ -70,8 +98,10 @@ export function drawOverlay(context, app, view) {
   if (app.switches.dots) drawDots(context, app, view);
   drawTrail(context, app, view);
   drawSuggestions(context, app, view);
-  for (const name of app.labels.names) if (name !== app.selected) drawPoint(context, app, view, name);
-  drawPoint(context, app, view, app.selected);
+  const others = app.labels.names.filter((name) => name !== app.selected);
+  const small = others.filter((name) => app.labels.pixel(name, app.frame)).length > MANY_POINTS;
+  const tags = [...others, app.selected].map((name) => drawPoint(context, app, view, name, small));
+  drawTags(context, tags.reverse().filter((each) => each !== null));
   if (app.cursor) drawCursor(context, view.toScreen(app.cursor));
 }
 
@@ -80,17 +110,22 @@ export function drawOverlay(context, app, view) {
  * @param {App} app
  * @param {View} view
  * @param {string} name
+ * @param {boolean} small
+ * @returns {Tag | null} its name, where it is in this frame
  */
-function drawPoint(context, app, view, name) {
+function drawPoint(context, app, view, name, small) {
   const pixel = app.labels.pixel(name, app.frame);
   const index = app.labels.indexOf(name);
   const colour = pointColour(index);
-  if (!pixel) return drawGhost(context, app, view, name, colour);
+  if (!pixel) {
+    drawGhost(context, app, view, name, colour);
+    return null;
+  }
   const observation = app.labels.at(name, app.frame);
   const chosen = name === app.selected;
   const { x, y } = view.toScreen(pixel);
   context.setLineDash(observation?.occluded ? [3, 4] : []);
-  outlined(context, crossPath(x, y, 3, chosen ? 15 : 11), colour, chosen ? 2.5 : 1.75);
+  outlined(context, small && !chosen ? crossPath(x, y, 2, 5) : crossPath(x, y, 3, chosen ? 15 : 11), colour, chosen ? 2.5 : 1.75);
   context.setLineDash([]);
   if (chosen) {
     const ring = new Path2D();
@@ -105,7 +140,7 @@ function drawPoint(context, app, view, name) {
     outlined(context, ring, DOUBT, 1.5);
     context.setLineDash([]);
   }
-  tag(context, name + (observation?.keyframe ? " ◆" : "") + (doubtful ? " ?" : ""), x, y, colour);
+  return { text: name + (observation?.keyframe ? " ◆" : "") + (doubtful ? " ?" : ""), x, y, colour };
 }
 
 /**
@@ -239,7 +274,7 @@ function drawSuggestions(context, app, view) {
     context.setLineDash([]);
     outlined(context, crossPath(x, y, 2, 5), "#ffffff", 1.25);
     const depth = each.depth_m === null ? "" : ` · ${each.depth_m.toFixed(2)} m`;
-    tag(context, `S${index + 1}${depth}`, x, y, "#ffffff");
+    tag(context, { text: `S${index + 1}${depth}`, x, y, colour: "#ffffff" });
   });
 }
 

@@ -123,7 +123,10 @@ export class Panels {
   #absentText() {
     const { app } = this;
     if (app.respawning) return "Respawn: choose its new place.";
-    return app.labels.lanes.has(app.selected) ? "Not labelled in this frame." : "Click on its place in the frame.";
+    if (!app.labels.lanes.has(app.selected)) return "Click on its place in the frame.";
+    if (!app.labels.lostAt(app.selected, app.place)) return "Not labelled in this frame.";
+    const gap_s = app.frames[app.place].time_s - app.frames[app.place - 1].time_s;
+    return `Lost, ${gap_s.toFixed(2)} s after the frame before. Click on its place to go on.`;
   }
 
   #drawDots() {

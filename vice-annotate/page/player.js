@@ -98,7 +98,7 @@ export class Player {
   /** @param {1 | -1} step @returns {boolean} whether there is one */
   doubtful(step) {
     const { app } = this;
-    const found = app.labels.doubtfulFrom(app.target, step);
+    const found = app.labels.doubtfulFrom(app.target, step, app.selected);
     if (!found) return false;
     this.pause();
     app.select(found.name);

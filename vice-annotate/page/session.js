@@ -1,10 +1,10 @@
 // Writes to the server: one after the other, each on the revision that the user saw. A write that came too late is
 // refused by the server; then the state is read again and the user is told.
 
-/** @import {Change, Direction, Edit, Job} from "./types.js" */
+/** @import {Change, Direction, Edit, Job, Targets} from "./types.js" */
 /** @import {Labels} from "./labels.js" */
 
-import { follow, getProjections, getState, postEdits, postHistory, postImport, postTrack, ServerError, stopTrack } from "./api.js";
+import { follow, getProjections, getState, postDetect, postEdits, postHistory, postImport, postTrack, ServerError, stopJob } from "./api.js";
 
 const PROJECTIONS_AFTER_MS = 250;
 
@@ -41,6 +41,10 @@ export class Session {
         this.listener.changed();
         if (job.state !== "running") this.listener.finished(job);
       },
+      save: (problem) => {
+        this.labels.state.save_problem = problem;
+        this.listener.changed();
+      },
       closed: () => this.listener.connection("closed"),
       lost: () => this.listener.connection("lost"),
       open: () => {
@@ -58,7 +62,7 @@ export class Session {
     this.#queue(async () => {
       const known = this.#apply(change);
       if (known === "missed") await this.reload();
-      if (known !== "known" && change.by !== "track") this.listener.elsewhere(change);
+      if (known !== "known" && change.by !== "track" && change.by !== "detect") this.listener.elsewhere(change);
     }).catch(() => undefined);
   }
 
@@ -197,12 +201,29 @@ export class Session {
     });
   }
 
+  /**
+   * @param {Targets} targets
+   * @returns {Promise<boolean>} whether it has begun
+   */
+  detect(targets) {
+    return this.#write(async () => {
+      try {
+        const job = await postDetect(this.labels.state.revision, targets);
+        if (job.state === "running") this.labels.applyJob(job);
+        this.listener.changed();
+        return true;
+      } catch (error) {
+        return this.#refused(error);
+      }
+    });
+  }
+
   /** @param {string[]} [points] only the jobs of these */
   async stop(points) {
     const jobs = this.labels.running.filter((job) => !points || job.points.some((name) => points.includes(name)));
     for (const job of jobs) {
       // It may have ended in the meantime: then there is nothing to stop.
-      await stopTrack(job.id).catch(() => undefined);
+      await stopJob(job.id).catch(() => undefined);
     }
     // Its last results may still be on their way: what comes next goes by the state with them.
     if (jobs.length > 0) await this.#queue(() => this.reload()).catch(() => undefined);

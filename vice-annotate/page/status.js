@@ -6,6 +6,7 @@
 /** @import {Player} from "./player.js" */
 
 import { byId, setText } from "./dom.js";
+import { underway } from "./jobs.js";
 
 export class Status {
   /**
@@ -63,8 +64,7 @@ export class Status {
     const total = jobs.reduce((sum, job) => sum + job.total, 0);
     const done = jobs.reduce((sum, job) => sum + job.done, 0);
     byId("job-progress", HTMLProgressElement).value = total > 0 ? done / total : 0;
-    const points = [...new Set(jobs.flatMap((job) => job.points))].join(", ");
-    setText(byId("job-text", HTMLElement), `Tracking ${points}: ${done} of ${total}`);
+    setText(byId("job-text", HTMLElement), jobs.map(underway).join(" · "));
   }
 
   #drawFrame() {

@@ -173,7 +173,7 @@ export class Timeline {
     if (names.length > 0) return;
     context.fillStyle = "#9aa7b2";
     context.font = "12px system-ui, sans-serif";
-    context.fillText("No points yet: click in the frame, or let Suggest find good places.", NAMES + 8, RULER + LANE / 2);
+    context.fillText("No points yet: click in the frame on what you want to follow, or press Suggest; then Track.", NAMES + 8, RULER + LANE / 2);
   }
 
   #followPlayhead() {

@@ -32,6 +32,16 @@
  * @property {number} total
  * @property {"running" | "done" | "stopped" | "failed"} state
  * @property {string | null} [message]
+ * @property {LaneEnd[]} [ends] where points were followed no further
+ * @property {string | null} [remarks] what the message says beyond that
+ */
+
+/**
+ * @typedef {object} LaneEnd
+ * @property {string} point
+ * @property {number} frame the first one without it
+ * @property {"lost" | "left-image" | "changed"} why
+ * @property {number} gap_s to that frame from the one before on the way
  */
 
 /**
@@ -51,6 +61,7 @@
  * @property {boolean} can_undo
  * @property {boolean} can_redo
  * @property {boolean} floor_suggestions
+ * @property {boolean} [depth_known] there is a depth source
  * @property {string[]} streams
  * @property {Job[]} jobs
  * @property {string} version
@@ -81,6 +92,21 @@
 /** @typedef {"forward" | "backward" | "both"} Direction */
 
 /** @typedef {{u: number, v: number, score: number, depth_m: number | null}} Suggestion */
+
+/**
+ * Where suggestions lie: on the floor as a scan or depth camera sees it; below the horizon, where that may be a wall;
+ * where there is depth; anywhere.
+ * @typedef {{suggestions: Suggestion[], lie: "floor" | "below-horizon" | "depth" | "any"}} Suggestions
+ */
+
+/**
+ * Targets to look for; null where not asked for.
+ * @typedef {object} Targets
+ * @property {string | null} apriltag the family
+ * @property {number | null} border_bits
+ * @property {string | null} chessboard inner corners, such as `6x7`
+ * @property {number | null} select how many points to keep
+ */
 
 /** @typedef {{name: string, kind: "reference" | "on-board", rmse_px: Record<string, number> | null}} Stream */
 

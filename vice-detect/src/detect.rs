@@ -1,12 +1,13 @@
 //! Labels of a run: all frames in parallel, then points over time.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 use vice_core::camera::{Camera, Pixel};
 use vice_core::dataset::{Dataset, Image};
 use vice_core::error::{DataError, DataResult};
-use vice_core::label::LabelSet;
+use vice_core::label::{LabelRow, LabelSet};
 use vice_core::time::{Span, Stamp};
 
 use crate::associate::{self, Gaps, Sighting};
@@ -74,6 +75,37 @@ pub struct Detection {
     pub report: DetectReport,
 }
 
+impl DetectReport {
+    /// Why there are no labels, in one line: what was looked for, in how many frames, and what might be meant.
+    pub fn nothing_found(&self, options: &DetectOptions) -> String {
+        let tags = options.tags.map(|t| format!("no tag {}", t.family.name()));
+        let board = options.board.map(|size| format!("no chessboard of {size} inner corners"));
+        let what: Vec<String> = [tags, board].into_iter().flatten().collect();
+        let mut text = format!("{} in view in {} frames", what.join(" and "), self.frames);
+        if !self.undecoded.is_empty() {
+            text += &format!(", {} could not be decoded", self.undecoded.len());
+        }
+        if let Some((w, h, count)) = self.other_board {
+            text += &format!(" (a grid of {w}x{h} is in {count} of them)");
+        }
+        text
+    }
+}
+
+/// The labels found that add to those that are there: points in frames where they have no label yet, in the order of
+/// `found`. What is there is never changed.
+pub fn additions(there: &LabelSet, found: &LabelSet) -> Vec<LabelRow> {
+    let taken: BTreeSet<(&str, Stamp)> = there
+        .points()
+        .iter()
+        .flat_map(|p| p.observations.iter().map(|o| (p.name.as_str(), o.stamp)))
+        .collect();
+    let all = found.points().iter().flat_map(|p| p.observations.iter().map(move |o| (p.name.as_str(), *o)));
+    all.filter(|(point, o)| !taken.contains(&(*point, o.stamp)))
+        .map(|(point, observation)| LabelRow { point: point.to_string(), observation })
+        .collect()
+}
+
 /// Tags in one picture, by number. With the camera, corners are where undistorted edges cross.
 pub fn find_tags(image: &Image, options: TagOptions, camera: Option<&Camera>) -> Vec<Tag> {
     tag::find(&Gray::of(image), options, camera)
@@ -102,7 +134,8 @@ enum Looked {
 ///
 /// Points are called `tag12.c0` (top left corner of the printed tag's border, then clockwise) and `board.r0c0` (row and
 /// column of the inner corner). Frames are looked at in parallel, a few at a time, so that memory does not grow with
-/// their number; the result does not depend on the number of threads. `progress` is called with (done, total).
+/// their number; the result does not depend on the number of threads. `progress` is called with (done, total), and may end
+/// the search there: the labels are then those of the frames that were done.
 /// A frame that cannot be decoded is skipped and reported.
 ///
 /// # Errors
@@ -113,7 +146,7 @@ pub fn detect_labels(
     camera: &Camera,
     frames: &[usize],
     options: &DetectOptions,
-    progress: &(dyn Fn(usize, usize) + Sync),
+    progress: &(dyn Fn(usize, usize) -> ControlFlow<()> + Sync),
 ) -> DataResult<Detection> {
     if options.tags.is_none() && options.board.is_none() {
         return Err(DataError::new("nothing to look for: neither tags nor a chessboard were named"));
@@ -149,7 +182,9 @@ pub fn detect_labels(
             }
         }
         done += some.len();
-        progress(done, frames.len());
+        if progress(done, frames.len()).is_break() {
+            break;
+        }
     }
     report.other_board =
         others.into_iter().max_by_key(|(_, count)| *count).map(|((w, h), count)| (w, h, count));

@@ -29,7 +29,7 @@ mod tag;
 
 pub use board::{Board, BoardSize};
 pub use depth::TagDepth;
-pub use detect::{DetectOptions, DetectReport, Detection, detect_labels, find_board, find_tags};
+pub use detect::{DetectOptions, DetectReport, Detection, additions, detect_labels, find_board, find_tags};
 pub use family::TagFamily;
 pub use pose::{TagPose, tag_pose};
 pub use tag::{Tag, TagOptions};

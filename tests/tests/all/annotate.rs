@@ -96,12 +96,12 @@ pub(crate) fn place(point: &str, frame: usize, u: f64, v: f64) -> Value {
     json!({ "op": "place", "point": point, "frame": frame, "u": u, "v": v })
 }
 
-fn good(answer: Answer) -> Value {
+pub(crate) fn good(answer: Answer) -> Value {
     assert!((200..300).contains(&answer.status), "{answer:?}");
     answer.json()
 }
 
-fn bad(answer: &Answer, status: u16, word: &str) {
+pub(crate) fn bad(answer: &Answer, status: u16, word: &str) {
     assert_eq!(answer.status, status, "{answer:?}");
     assert!(answer.json()["error"].as_str().unwrap().contains(word), "{answer:?}");
 }

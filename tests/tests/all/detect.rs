@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::ops::ControlFlow;
 
 use serde_json::Value;
 use vice_core::camera::Pixel;
@@ -21,7 +22,10 @@ fn detect(options: &DetectOptions) -> Option<Detection> {
     let dataset = Euroc.open(&path, &OpenOptions::default()).unwrap();
     let camera = dataset.camera("cam0").unwrap();
     let frames: Vec<usize> = (0..dataset.frames("cam0").unwrap().len()).collect();
-    Some(detect_labels(dataset.as_ref(), "cam0", &camera, &frames, options, &|_, _| {}).unwrap())
+    Some(
+        detect_labels(dataset.as_ref(), "cam0", &camera, &frames, options, &|_, _| ControlFlow::Continue(()))
+            .unwrap(),
+    )
 }
 
 fn tags(family: TagFamily) -> DetectOptions {

@@ -1,5 +1,6 @@
 //! Targets that were rendered: corners and depth of which the truth is known.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -173,7 +174,8 @@ fn a_board_that_looks_alike_from_both_ends_keeps_its_names_while_it_moves() {
     let run = Rendered { camera: camera(), frames: frames.collect() };
     let options = DetectOptions { board: Some(size), ..DetectOptions::default() };
     let all: Vec<usize> = (0..12).collect();
-    let found = detect_labels(&run, "cam", &run.camera, &all, &options, &|_, _| {}).unwrap();
+    let found =
+        detect_labels(&run, "cam", &run.camera, &all, &options, &|_, _| ControlFlow::Continue(())).unwrap();
     assert_eq!((found.report.frames_with_board, found.report.segments), (12, 35));
     let first = &found.labels.points()[0];
     assert_eq!(first.name, "board.r0c0");

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr)]
 
 mod annotate;
+mod annotate_detect;
 mod annotate_kill;
 mod annotator;
 mod bad_input;

@@ -1,6 +1,7 @@
-//! Tracking in the background: from an observation to later or earlier frames, until a point is lost or a person has
-//! placed it.
+//! Work in the background: tracking from an observation to later or earlier frames, until a point is lost or a person has
+//! placed it, and looking for calibration targets.
 
+mod detect;
 mod lane;
 mod run;
 
@@ -9,6 +10,9 @@ use std::sync::{Arc, Mutex};
 
 use serde::{Deserialize, Serialize};
 use vice_core::error::{DataError, DataResult};
+
+pub use detect::DetectRequest;
+use vice_detect::DetectOptions;
 
 use crate::desk::Desk;
 use crate::store::{Changed, Store, StoreError, lock};
@@ -58,25 +62,82 @@ pub enum Progress {
     Failed,
 }
 
+/// What a job does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum JobKind {
+    /// Follows points through the images.
+    Track,
+    /// Looks for calibration targets.
+    Detect,
+}
+
+/// Why a point was not followed any further.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EndReason {
+    /// It was not found again.
+    Lost,
+    /// It left the image.
+    LeftImage,
+    /// The observation that tracking started from was changed.
+    Changed,
+}
+
+/// Where the tracking of a point ended.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LaneEnd {
+    /// The point.
+    pub point: String,
+    /// The first frame without it.
+    pub frame: usize,
+    /// Why.
+    pub why: EndReason,
+    /// Time to that frame from the one before on the way, seconds: over a long one much can have changed.
+    pub gap_s: f64,
+}
+
 /// A job as others see it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JobState {
     /// Its number.
     pub id: u64,
     /// What it does.
-    pub kind: &'static str,
-    /// The points.
+    pub kind: JobKind,
+    /// The points, of a tracking job.
     pub points: Vec<String>,
-    /// Which way.
-    pub direction: Direction,
+    /// Which way, of a tracking job.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direction: Option<Direction>,
     /// Frames that are done.
     pub done: usize,
     /// Frames at most.
     pub total: usize,
     /// How it stands.
     pub state: Progress,
-    /// What became of the points.
+    /// What became of the points, or what was found.
     pub message: Option<String>,
+    /// Where points were followed no further.
+    pub ends: Vec<LaneEnd>,
+    /// What `message` says beyond `ends`.
+    pub remarks: Option<String>,
+}
+
+impl JobState {
+    const fn new(id: u64, kind: JobKind, total: usize) -> Self {
+        Self {
+            id,
+            kind,
+            points: vec![],
+            direction: None,
+            done: 0,
+            total,
+            state: Progress::Running,
+            message: None,
+            ends: vec![],
+            remarks: None,
+        }
+    }
 }
 
 /// Who is told of what happens. Changes are told while the labels are locked, so that they come in order.
@@ -88,8 +149,7 @@ pub trait Listener: Send + Sync {
 }
 
 /// A job under way or finished.
-pub(crate) struct Job {
-    pub(crate) request: TrackRequest,
+struct Job {
     state: Mutex<JobState>,
     stop: AtomicBool,
 }
@@ -120,10 +180,18 @@ pub struct Jobs {
 }
 
 /// A job that was accepted, and now has to be run on a thread that may take its time.
-pub struct Accepted(Arc<Job>);
+pub struct Accepted {
+    job: Arc<Job>,
+    work: Work,
+}
+
+enum Work {
+    Track(TrackRequest),
+    Detect(DetectOptions),
+}
 
 impl Jobs {
-    /// Accepts a request. Jobs under way for the same points are stopped: the newer one knows better.
+    /// Accepts a request to track. Tracking under way for the same points is stopped: the newer one knows better.
     ///
     /// # Errors
     /// [`StoreError`] if the asker's revision is stale, nothing can be written, or a point has no observation to
@@ -134,18 +202,36 @@ impl Jobs {
         check(desk, &store, &request).map_err(StoreError::Refused)?;
         let id = store.new_job();
         drop(store);
+        let total = run::legs(desk, &request).iter().map(Vec::len).sum();
         let state = JobState {
-            id,
-            kind: "track",
             points: request.points.clone(),
-            direction: request.direction,
-            done: 0,
-            total: run::legs(desk, &request).iter().map(Vec::len).sum(),
-            state: Progress::Running,
-            message: None,
+            direction: Some(request.direction),
+            ..JobState::new(id, JobKind::Track, total)
         };
-        let job = Arc::new(Job { request, state: Mutex::new(state.clone()), stop: AtomicBool::new(false) });
-        self.stop_where(|other| other.points.iter().any(|p| job.request.points.contains(p)));
+        self.stop_where(|other| other.points.iter().any(|p| request.points.contains(p)));
+        Ok(self.add(state, Work::Track(request)))
+    }
+
+    /// Accepts a request to look for targets. A search under way is stopped.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the asker's revision is stale, nothing can be written, or there is no such target.
+    pub fn accept_detect(
+        &self,
+        desk: &Desk,
+        request: &DetectRequest,
+    ) -> Result<(Accepted, JobState), StoreError> {
+        let options = request.options().map_err(StoreError::Refused)?;
+        let mut store = desk.store();
+        store.check_known(request.revision)?;
+        let id = store.new_job();
+        drop(store);
+        self.stop_where(|other| other.kind == JobKind::Detect);
+        Ok(self.add(JobState::new(id, JobKind::Detect, desk.chosen.len()), Work::Detect(options)))
+    }
+
+    fn add(&self, state: JobState, work: Work) -> (Accepted, JobState) {
+        let job = Arc::new(Job { state: Mutex::new(state.clone()), stop: AtomicBool::new(false) });
         let mut list = lock(&self.list);
         let finished = list.iter().filter(|j| j.state().state != Progress::Running).count();
         let mut too_many = finished.saturating_sub(REMEMBERED);
@@ -155,12 +241,15 @@ impl Jobs {
             !drop
         });
         list.push(Arc::clone(&job));
-        Ok((Accepted(job), state))
+        (Accepted { job, work }, state)
     }
 
     /// Runs a job to its end.
     pub fn run(desk: &Desk, listener: &dyn Listener, accepted: &Accepted) {
-        run::run(desk, listener, &accepted.0);
+        match &accepted.work {
+            Work::Track(request) => run::run(desk, listener, &accepted.job, request),
+            Work::Detect(options) => detect::run(desk, listener, &accepted.job, options),
+        }
     }
 
     /// The jobs, oldest first.

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use vice_core::error::{DataResult, one_line};
 
 use super::lane::{Fate, Lane};
-use super::{Direction, Job, Listener, Progress, TrackRequest};
+use super::{Direction, EndReason, Job, LaneEnd, Listener, Progress, TrackRequest};
 use crate::desk::Desk;
 use crate::store::{By, StoreError};
 use crate::tracker::Pyramid;
@@ -39,11 +39,21 @@ pub(super) fn legs(desk: &Desk, request: &TrackRequest) -> Vec<Vec<usize>> {
 }
 
 /// Tracks until every point's lane has ended, the job is stopped, or something cannot be written.
-pub(super) fn run(desk: &Desk, listener: &dyn Listener, job: &Job) {
-    let mut runner =
-        Runner { desk, listener, job, last_batch: Instant::now(), remarks: BTreeMap::new(), bad_frames: 0 };
+pub(super) fn run(desk: &Desk, listener: &dyn Listener, job: &Job, request: &TrackRequest) {
+    let mut runner = Runner {
+        desk,
+        listener,
+        job,
+        request,
+        last_batch: Instant::now(),
+        ends: Vec::new(),
+        remarks: BTreeMap::new(),
+        bad_frames: 0,
+    };
     let outcome = runner.run();
     let remarks = runner.remarks();
+    let ends: Vec<String> = runner.ends.iter().map(end_text).collect();
+    let said: Vec<String> = ends.into_iter().chain(remarks.clone()).collect();
     job.update(listener, |state| {
         state.state = match &outcome {
             Ok(()) if job.is_stopped() => Progress::Stopped,
@@ -54,47 +64,64 @@ pub(super) fn run(desk: &Desk, listener: &dyn Listener, job: &Job) {
             state.done = state.total;
         }
         state.message = match outcome {
-            Ok(()) => (!remarks.is_empty()).then_some(remarks),
+            Ok(()) => (!said.is_empty()).then(|| said.join("; ")),
             Err(error) => Some(error),
         };
+        state.ends = runner.ends;
+        state.remarks = remarks;
     });
+}
+
+fn end_text(end: &LaneEnd) -> String {
+    let LaneEnd { point, frame, why, gap_s } = end;
+    match why {
+        EndReason::Lost => format!("{point} is lost in frame {frame}, {gap_s:.2} s after the one before"),
+        EndReason::LeftImage => format!("{point} leaves the image in frame {frame}"),
+        EndReason::Changed => format!("{point} was changed where tracking started"),
+    }
 }
 
 struct Runner<'a> {
     desk: &'a Desk,
     listener: &'a dyn Listener,
     job: &'a Job,
+    request: &'a TrackRequest,
     last_batch: Instant,
-    /// What became of points, by point and way.
+    ends: Vec<LaneEnd>,
+    /// What else became of points, by point and way.
     remarks: BTreeMap<(String, usize), String>,
     bad_frames: usize,
 }
 
 impl Runner<'_> {
     fn run(&mut self) -> Result<(), String> {
-        let start = self.job.request.frame;
+        let start = self.request.frame;
         let image = self.pyramid(start).map_err(|e| e.to_string())?;
         let mut done = 0;
-        for (way, frames) in legs(self.desk, &self.job.request).into_iter().enumerate() {
+        for (way, frames) in legs(self.desk, self.request).into_iter().enumerate() {
             let mut lanes = self.lanes(&image, way)?;
             self.leg(&mut lanes, &frames, &mut done)?;
-            for lane in &lanes {
-                let remark = match lane.fate {
-                    Some(Fate::Lost(frame)) => format!("{} is lost in frame {frame}", lane.point),
-                    Some(Fate::LeftImage(frame)) => {
-                        format!("{} leaves the image in frame {frame}", lane.point)
-                    }
-                    Some(Fate::Void) => format!("{} was changed where tracking started", lane.point),
-                    None => continue,
-                };
-                self.remarks.insert((lane.point.clone(), way), remark);
-            }
+            let ends: Vec<LaneEnd> = lanes.iter().filter_map(|lane| self.end(lane, &frames)).collect();
+            self.ends.extend(ends);
         }
         Ok(())
     }
 
+    fn end(&self, lane: &Lane, frames: &[usize]) -> Option<LaneEnd> {
+        let start = self.request.frame;
+        let (why, frame) = match lane.fate? {
+            Fate::Lost(frame) => (EndReason::Lost, frame),
+            Fate::LeftImage(frame) => (EndReason::LeftImage, frame),
+            Fate::Void => (EndReason::Changed, start),
+        };
+        let at = frames.iter().position(|f| *f == frame);
+        let before = at.and_then(|at| at.checked_sub(1)).map_or(start, |at| frames[at]);
+        let gap_s = self.desk.frames[frame].since(self.desk.frames[before]).as_secs_f64().abs();
+        Some(LaneEnd { point: lane.point.clone(), frame, why, gap_s })
+    }
+
     fn lanes(&mut self, image: &Arc<Pyramid>, way: usize) -> Result<Vec<Lane>, String> {
-        let request = &self.job.request;
+        let request = self.request;
         let stamp = self.desk.frames[request.frame];
         let mut lanes = Vec::new();
         for point in &request.points {
@@ -108,7 +135,7 @@ impl Runner<'_> {
             }
         }
         if lanes.is_empty() {
-            return Err(self.remarks());
+            return Err(self.remarks().unwrap_or_else(|| "nothing is left to track".to_string()));
         }
         Ok(lanes)
     }
@@ -175,7 +202,7 @@ impl Runner<'_> {
     }
 
     fn label(&self) -> String {
-        let request = &self.job.request;
+        let request = self.request;
         let way = match request.direction {
             Direction::Forward => "forwards",
             Direction::Backward => "backwards",
@@ -184,12 +211,12 @@ impl Runner<'_> {
         format!("track {} {way} from frame {}", request.points.join(", "), request.frame)
     }
 
-    fn remarks(&self) -> String {
+    fn remarks(&self) -> Option<String> {
         let mut remarks: Vec<String> = self.remarks.values().cloned().collect();
         if self.bad_frames > 0 {
             remarks.push(format!("{} frames could not be decoded", self.bad_frames));
         }
-        remarks.join("; ")
+        (!remarks.is_empty()).then(|| remarks.join("; "))
     }
 
     fn pyramid(&self, frame: usize) -> DataResult<Arc<Pyramid>> {

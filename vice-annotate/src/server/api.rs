@@ -20,7 +20,7 @@ use super::error::ApiError;
 use super::wire::{ChangeWire, FrameWire, StateWire, points};
 use crate::desk::Desk;
 use crate::exchange::{Exchange, ImportError, import};
-use crate::jobs::{JobState, Jobs, Listener, TrackRequest};
+use crate::jobs::{Accepted, DetectRequest, JobState, Jobs, Listener, TrackRequest};
 use crate::store::{By, Changed, Edit, Store, StoreError, lock};
 use crate::suggest::{SuggestOptions, suggest};
 use crate::tracker::{DOUBT_CONFIDENCE, Pyramid};
@@ -100,6 +100,7 @@ pub(super) async fn state(State(app): Shared) -> Answer {
             can_undo: store.can_undo(),
             can_redo: store.can_redo(),
             floor_suggestions: desk.estimates.as_ref().is_some_and(|e| e.uses_floor()),
+            depth_known: desk.estimates.is_some(),
             streams: desk.estimates.as_ref().map(|e| e.streams()).unwrap_or_default(),
             jobs: app.jobs.states(),
             doubt_below: DOUBT_CONFIDENCE,
@@ -162,18 +163,14 @@ pub(super) async fn track(State(app): Shared, body: Body) -> Answer {
     let request: TrackRequest = parse(body)?;
     let accepting = Arc::clone(&app);
     let (accepted, state) = spawn(move || accepting.jobs.accept(&accepting.desk, request)).await??;
-    let running = Arc::clone(&app);
-    tokio::spawn(async move {
-        // One job after the other: each keeps all processors busy.
-        let Ok(_permit) = running.job_permits.acquire().await else { return };
-        let app = Arc::clone(&running);
-        let run = spawn(move || Jobs::run(&app.desk, &app.hub, &accepted)).await;
-        if let Err(error) = run {
-            tracing::error!("tracking ended unexpectedly: {error:?}");
-        }
-    });
-    app.hub.job(&state);
-    Ok((StatusCode::ACCEPTED, Json::<JobState>(state)).into_response())
+    Ok(app.started(accepted, state))
+}
+
+pub(super) async fn detect(State(app): Shared, body: Body) -> Answer {
+    let request: DetectRequest = parse(body)?;
+    let accepting = Arc::clone(&app);
+    let (accepted, state) = spawn(move || accepting.jobs.accept_detect(&accepting.desk, &request)).await??;
+    Ok(app.started(accepted, state))
 }
 
 pub(super) async fn stop(State(app): Shared, Path(job): Path<u64>) -> Answer {
@@ -197,18 +194,29 @@ pub(super) async fn suggestions(State(app): Shared, Query(query): Query<SuggestQ
         let depth = |pixels: &[Pixel]| -> Option<Vec<Option<f64>>> {
             desk.estimates.as_ref()?.depths(query.frame, pixels).ok()
         };
-        let has_depth = |px: Pixel| depth(&[px]).is_none_or(|z| z.iter().all(Option::is_some));
+        // Where no stream has a pose there is no depth either.
+        let has_depth = |px: Pixel| {
+            desk.estimates.is_none() || depth(&[px]).is_some_and(|z| z.iter().all(Option::is_some))
+        };
         let floor = FloorMask::new(desk, query.frame);
         let on_floor = |px: Pixel| floor.as_ref().is_none_or(|f| f.holds(px)) && has_depth(px);
         // Points off the floor are better than none, and so are those without depth: another frame may know it.
-        let accepts: [&dyn Fn(Pixel) -> bool; 3] = [&on_floor, &has_depth, &|_| true];
-        let found = accepts
+        let on_surest = match (&desk.estimates, &floor) {
+            (None, _) => "any",
+            (Some(_), Some(_)) => "floor",
+            (Some(e), None) if e.uses_floor() => "below-horizon",
+            (Some(_), None) => "depth",
+        };
+        let accepts: [(&str, &dyn Fn(Pixel) -> bool); 3] =
+            [(on_surest, &on_floor), ("depth", &has_depth), ("any", &|_| true)];
+        let (lie, found) = accepts
             .into_iter()
-            .map(|accept| {
-                suggest(&image, count, &SuggestOptions { taken: &taken, accept, ..SuggestOptions::default() })
+            .map(|(lie, accept)| {
+                let options = SuggestOptions { taken: &taken, accept, ..SuggestOptions::default() };
+                (lie, suggest(&image, count, &options))
             })
-            .find(|found| !found.is_empty())
-            .unwrap_or_default();
+            .find(|(_, found)| !found.is_empty())
+            .unwrap_or(("any", vec![]));
         let pixels: Vec<Pixel> = found.iter().map(|s| s.px).collect();
         let depths = depth(&pixels).unwrap_or_else(|| vec![None; pixels.len()]);
         let list: Vec<_> = found
@@ -216,7 +224,7 @@ pub(super) async fn suggestions(State(app): Shared, Query(query): Query<SuggestQ
             .zip(depths)
             .map(|(s, z)| json!({ "u": s.px.u, "v": s.px.v, "score": s.score, "depth_m": z }))
             .collect();
-        Ok(Json(json!({ "suggestions": list })).into_response())
+        Ok(Json(json!({ "suggestions": list, "lie": lie })).into_response())
     })
     .await
 }
@@ -316,6 +324,22 @@ impl App {
     {
         let app = Arc::clone(self);
         spawn(move || work(&app)).await?
+    }
+
+    /// Runs a job in the background and answers with it.
+    fn started(self: &Arc<Self>, accepted: Accepted, state: JobState) -> Response {
+        let running = Arc::clone(self);
+        tokio::spawn(async move {
+            // One job after the other: each keeps all processors busy.
+            let Ok(_permit) = running.job_permits.acquire().await else { return };
+            let app = Arc::clone(&running);
+            let run = spawn(move || Jobs::run(&app.desk, &app.hub, &accepted)).await;
+            if let Err(error) = run {
+                tracing::error!("a job ended unexpectedly: {error:?}");
+            }
+        });
+        self.hub.job(&state);
+        (StatusCode::ACCEPTED, Json::<JobState>(state)).into_response()
     }
 
     async fn change<F>(self: &Arc<Self>, change: F) -> Answer

@@ -1,11 +1,13 @@
 //! What happens, told to all open windows.
 
 use std::convert::Infallible;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use axum::response::sse::{Event, KeepAlive, Sse};
 use futures_util::stream::{Stream, unfold};
 use tokio::sync::{broadcast, watch};
+use vice_core::error::DataResult;
 use vice_core::time::Stamp;
 
 use super::wire::ChangeWire;
@@ -23,8 +25,20 @@ pub(super) struct Hub {
 }
 
 impl Hub {
-    pub(super) fn new(saver: Saver, frames: Arc<[Stamp]>) -> Self {
-        Self { sender: broadcast::channel(BACKLOG).0, saver, frames }
+    /// Starts saving, too: windows hear of it when the labels file falls behind the journal.
+    pub(super) fn new(
+        store: Arc<Mutex<Store>>,
+        save_delay: Duration,
+        frames: Arc<[Stamp]>,
+    ) -> DataResult<Self> {
+        let sender = broadcast::channel(BACKLOG).0;
+        let of_saver = sender.clone();
+        let on_problem = move |problem: Option<&str>| {
+            let text = serde_json::json!({ "save_problem": problem }).to_string();
+            drop(of_saver.send(("save", text.into())));
+        };
+        let saver = Saver::start(store, save_delay, Box::new(on_problem))?;
+        Ok(Self { sender, saver, frames })
     }
 
     /// Ends the saving.

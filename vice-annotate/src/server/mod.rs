@@ -27,7 +27,6 @@ use vice_core::error::{DataError, DataResult};
 
 use crate::desk::Desk;
 use crate::jobs::Jobs;
-use crate::store::Saver;
 use error::ApiError;
 use events::Hub;
 use frames::Frames;
@@ -107,12 +106,11 @@ async fn run(desk: Desk, options: &ServerOptions, ready: impl FnOnce(&str)) -> D
         _ => address,
     };
     let url = format!("http://{shown}/?token={token}");
-    let saver = Saver::start(Arc::clone(&desk.store), SAVE_DELAY)?;
     let size = (desk.camera.width(), desk.camera.height());
     let app = Arc::new(App {
         jobs: Jobs::default(),
         job_permits: Semaphore::new(1),
-        hub: Hub::new(saver, Arc::clone(&desk.frames)),
+        hub: Hub::new(Arc::clone(&desk.store), SAVE_DELAY, Arc::clone(&desk.frames))?,
         frames: Frames::new(Arc::clone(&desk.dataset), desk.camera_name.clone(), size),
         keys: options.keys.clone(),
         projections: Mutex::default(),
@@ -170,6 +168,7 @@ fn router(app: &Arc<App>) -> Router {
         .route("/api/redo", post(api::redo))
         .route("/api/track", post(api::track))
         .route("/api/track/{job}", delete(api::stop))
+        .route("/api/detect", post(api::detect))
         .route("/api/suggestions", get(api::suggestions))
         .route("/api/projections", get(api::projections))
         .route("/api/export", get(api::export))

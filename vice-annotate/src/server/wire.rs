@@ -59,6 +59,7 @@ pub(super) struct StateWire<'a> {
     pub(super) can_undo: bool,
     pub(super) can_redo: bool,
     pub(super) floor_suggestions: bool,
+    pub(super) depth_known: bool,
     pub(super) streams: Vec<String>,
     pub(super) jobs: Vec<JobState>,
     pub(super) doubt_below: f64,

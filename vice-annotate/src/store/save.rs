@@ -85,6 +85,12 @@ impl Store {
     }
 }
 
+/// How long after a save that failed it is tried again.
+const RETRY: Duration = Duration::from_secs(5);
+
+/// Who is told why the labels file is behind the journal (`None`: it no longer is), whenever that changes.
+type OnProblem = Box<dyn Fn(Option<&str>) + Send>;
+
 /// Saves in the background some time after a change.
 #[derive(Debug)]
 pub struct Saver {
@@ -106,18 +112,19 @@ struct Wanted {
 }
 
 impl Saver {
-    /// Starts saving a store `delay` after each first change.
+    /// Starts saving a store `delay` after each first change, and tells `on_problem` when the labels file falls behind the
+    /// journal, and when it has caught up.
     ///
     /// # Errors
     /// [`DataError`] if no thread can be started.
-    pub fn start(store: Arc<Mutex<Store>>, delay: Duration) -> DataResult<Self> {
+    pub fn start(store: Arc<Mutex<Store>>, delay: Duration, on_problem: OnProblem) -> DataResult<Self> {
         let shared = Arc::new(Shared { store, wanted: Mutex::default(), wake: Condvar::new() });
         let of_thread = Arc::clone(&shared);
         // What was restored from the journal is worth saving, too.
         shared.want();
         let thread = std::thread::Builder::new()
             .name("save labels".to_string())
-            .spawn(move || of_thread.run(delay))
+            .spawn(move || of_thread.run(delay, &on_problem))
             .map_err(|e| DataError::new("cannot start a thread").because(e))?;
         Ok(Self { shared, thread: Some(thread) })
     }
@@ -171,8 +178,10 @@ impl Shared {
         self.wake.notify_all();
     }
 
-    fn run(&self, delay: Duration) {
+    fn run(&self, delay: Duration, on_problem: &OnProblem) {
+        let mut told: Option<String> = None;
         loop {
+            let delay = if told.is_some() { RETRY } else { delay };
             let mut wanted = lock(&self.wanted);
             loop {
                 if wanted.stop {
@@ -189,6 +198,15 @@ impl Shared {
             wanted.since = None;
             drop(wanted);
             save(&self.store);
+            let problem = lock(&self.store).save_problem().map(str::to_string);
+            if problem.is_some() {
+                // Room may be made on the disk without any further change here.
+                self.want();
+            }
+            if problem != told {
+                on_problem(problem.as_deref());
+                told = problem;
+            }
         }
     }
 }

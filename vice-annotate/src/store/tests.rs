@@ -53,7 +53,10 @@ impl Desk {
 
     fn save(&self, store: Store) -> Store {
         let store = Arc::new(Mutex::new(store));
-        Saver::start(Arc::clone(&store), Duration::from_secs(60)).unwrap().finish().unwrap();
+        Saver::start(Arc::clone(&store), Duration::from_secs(60), Box::new(|_| {}))
+            .unwrap()
+            .finish()
+            .unwrap();
         Arc::into_inner(store).unwrap().into_inner().unwrap()
     }
 
@@ -263,7 +266,8 @@ fn another_program_is_not_written_over() {
     let changed = other.replace("20.0", "40.0");
     fs::write(desk.path("a.json"), &changed).unwrap();
     let store = Arc::new(Mutex::new(store));
-    let finished = Saver::start(Arc::clone(&store), Duration::from_secs(60)).unwrap().finish();
+    let finished =
+        Saver::start(Arc::clone(&store), Duration::from_secs(60), Box::new(|_| {})).unwrap().finish();
     assert!(finished.unwrap_err().to_string().contains("another program"));
     assert!(lock(&store).save_problem().is_some());
     drop(store);

@@ -1,11 +1,12 @@
 //! `vice labels detect`: calibration targets as labels.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use vice_core::evaluate::Window;
 use vice_core::label::{LabelRow, LabelSet};
 use vice_core::time::Span;
-use vice_detect::{BoardSize, DetectOptions, DetectReport, TagFamily, TagOptions, detect_labels};
+use vice_detect::{BoardSize, DetectOptions, DetectReport, TagFamily, TagOptions, additions, detect_labels};
 use vice_files::atomic::Overwrite;
 use vice_files::calibration::CalibrationFile;
 use vice_files::labels::{self, LabelFormat};
@@ -129,11 +130,12 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         detect_labels(dataset.as_ref(), &used.name, &used.camera, &frames, &options, &|done, total| {
             bar.set_length(total as u64);
             bar.set_position(done as u64);
+            ControlFlow::Continue(())
         })?;
     bar.finish_and_clear();
     warn(&found.report);
     if found.labels.points().is_empty() {
-        anyhow::bail!("{}: {}", args.dataset.path.display(), nothing_found(args, &found.report));
+        anyhow::bail!("{}: {}", args.dataset.path.display(), nothing_found(&options, &found.report));
     }
     let labels = match there {
         Some(there) => added(there, &found.labels)?,
@@ -147,17 +149,12 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
 
 /// All labels that are there, and the new ones of points and frames that have none.
 fn added(there: LabelSet, new: &LabelSet) -> anyhow::Result<LabelSet> {
-    let rows_of = |set: &LabelSet| -> Vec<LabelRow> {
-        let rows = set
-            .points()
-            .iter()
-            .flat_map(|p| p.observations.iter().map(|o| LabelRow { point: p.name.clone(), observation: *o }));
-        rows.collect()
-    };
-    let taken: std::collections::BTreeSet<_> =
-        rows_of(&there).into_iter().map(|r| (r.point, r.observation.stamp)).collect();
-    let more = rows_of(new).into_iter().filter(|r| !taken.contains(&(r.point.clone(), r.observation.stamp)));
-    let mut labels = LabelSet::from_rows(rows_of(&there).into_iter().chain(more))?;
+    let more = additions(&there, new);
+    let rows = there
+        .points()
+        .iter()
+        .flat_map(|p| p.observations.iter().map(|o| LabelRow { point: p.name.clone(), observation: *o }));
+    let mut labels = LabelSet::from_rows(rows.chain(more))?;
     labels.dataset = there.dataset.or_else(|| new.dataset.clone());
     labels.camera = there.camera.or_else(|| new.camera.clone());
     Ok(labels)
@@ -175,19 +172,13 @@ fn warn(report: &DetectReport) {
     }
 }
 
-/// Why there are no labels, and what might be meant.
-fn nothing_found(args: &Args, report: &DetectReport) -> String {
-    let tags = args.targets.apriltag.map(|family| format!("no tag {}", family.name()));
-    let board = args.targets.chessboard.map(|size| format!("no chessboard of {size} inner corners"));
-    let what: Vec<String> = [tags, board].into_iter().flatten().collect();
-    let mut text = format!("{} in view in {} frames", what.join(" and "), report.frames);
-    if !report.undecoded.is_empty() {
-        text += &format!(", {} could not be decoded", report.undecoded.len());
+/// Why there are no labels, and what to ask for instead.
+fn nothing_found(options: &DetectOptions, report: &DetectReport) -> String {
+    let text = report.nothing_found(options);
+    match report.other_board {
+        Some((w, h, _)) => format!("{text}: --chessboard {w}x{h}?"),
+        None => text,
     }
-    if let Some((w, h, count)) = report.other_board {
-        text += &format!(" (a grid of {w}x{h} is in {count} of them: --chessboard {w}x{h}?)");
-    }
-    text
 }
 
 fn summary(args: &Args, labels: &LabelSet, report: &DetectReport) -> String {
