@@ -159,7 +159,7 @@ export class Timeline {
   #drawLanes(height, ratio) {
     const { app, canvas, lanes } = this;
     const { names } = app.labels;
-    const key = [app.labels.state.revision, app.selected, this.first, this.zoom, canvas.width, canvas.height, names.length].join(" ");
+    const key = [app.labels.state.revision, app.selected, this.first, this.zoom, canvas.width, canvas.height, names.length, app.labels.doubtfulCount].join(" ");
     if (key === this.drawn && app.labels.lanes === this.drawnLanes) return;
     this.drawn = key;
     this.drawnLanes = app.labels.lanes;
@@ -257,8 +257,28 @@ export class Timeline {
       const x = this.#x(place);
       if (x + wide < NAMES || x > this.width) continue;
       this.#drawObservation(context, observation, x, top, Math.max(1, wide), colour);
+      if (place + 1 < app.frames.length && app.labels.lostAt(name, place + 1)) this.#drawLoss(context, x + wide, top, wide);
     }
     context.restore();
+  }
+
+  /**
+   * A cross where tracking lost the point.
+   * @param {CanvasRenderingContext2D} context
+   * @param {number} x
+   * @param {number} top
+   * @param {number} wide
+   */
+  #drawLoss(context, x, top, wide) {
+    const middle = x + Math.max(5, wide / 2);
+    context.strokeStyle = DOUBT;
+    context.lineWidth = 2;
+    context.beginPath();
+    for (const slope of [-1, 1]) {
+      context.moveTo(middle - 4, top + LANE / 2 - 4 * slope);
+      context.lineTo(middle + 4, top + LANE / 2 + 4 * slope);
+    }
+    context.stroke();
   }
 
   /**
