@@ -12,6 +12,7 @@
 mod curves;
 mod score;
 mod select;
+mod skip;
 mod streams;
 pub(crate) mod trial;
 
@@ -20,9 +21,10 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 pub use select::{Observations, SelectedKeyframe, Selection, Window};
+pub use skip::{BEHIND_CAMERA, NOT_MANUAL, OCCLUDED, OUTSIDE_MODEL, SkipReason};
 pub use streams::Stream;
 
-use crate::camera::{Camera, Pixel, ProjectError};
+use crate::camera::{Camera, Pixel};
 use crate::dataset::{Dataset, Floor};
 use crate::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
 use crate::error::{DataError, DataResult};
@@ -31,103 +33,6 @@ use crate::metrics::align::Alignment;
 use crate::metrics::pixel::{pooled_rmse_px, subset_rmse_px};
 use crate::result::{DatasetPart, PixelPart, PointName, ResultDocument, SCHEMA, Sample, Settings, Skip};
 use crate::time::{Span, Stamp};
-use crate::trajectory::NoPose;
-
-/// The reason of labels that a human marked as hidden: not scored, and not counted against the run.
-pub const OCCLUDED: &str = "occluded";
-
-/// The reason of labels that a machine made where only manual ones were asked for: not counted against the run either.
-pub const NOT_MANUAL: &str = "not-manual";
-
-/// The reason of a label whose point was carried behind the camera.
-pub const BEHIND_CAMERA: &str = "behind-camera";
-
-/// The reason of a label whose point was carried further to the side than the distortion model reaches.
-pub const OUTSIDE_MODEL: &str = "outside-model";
-
-/// Why a label was not scored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[non_exhaustive]
-pub enum SkipReason {
-    /// Its stamp is no frame of the camera.
-    NoFrame,
-    /// The stamp of its key frame is no frame of the camera.
-    KeyframeNoFrame,
-    /// No key frame precedes it.
-    BeforeFirstKeyframe,
-    /// A human marked it as hidden.
-    Occluded,
-    /// A machine made it, and only manual labels were asked for.
-    NotManual,
-    /// A machine made its key frame, and only manual labels were asked for.
-    KeyframeNotManual,
-    /// The stream has no pose at its key frame.
-    KeyframeGap,
-    /// Its frame lies in too wide a gap of the stream.
-    FrameGap,
-    /// Its frame lies before the stream's first pose.
-    BeforeStream,
-    /// Its frame lies after the stream's last pose.
-    AfterStream,
-    /// The camera's place in the body is not known at its frame or key frame.
-    NoExtrinsics,
-    /// The key frame's pixel has no depth.
-    NoDepth(DepthMiss),
-    /// The carried point is not in front of the camera.
-    BehindCamera,
-    /// The carried point is so far to the side that the distortion model does not reach it.
-    OutsideModel,
-}
-
-impl SkipReason {
-    /// The name in documents.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::NoFrame => "no-frame",
-            Self::KeyframeNoFrame => "keyframe-no-frame",
-            Self::BeforeFirstKeyframe => "before-first-keyframe",
-            Self::Occluded => OCCLUDED,
-            Self::NotManual => NOT_MANUAL,
-            Self::KeyframeNotManual => "keyframe-not-manual",
-            Self::KeyframeGap => "keyframe-gap",
-            Self::FrameGap => "frame-gap",
-            Self::BeforeStream => "before-stream",
-            Self::AfterStream => "after-stream",
-            Self::NoExtrinsics => "no-extrinsics",
-            Self::BehindCamera => BEHIND_CAMERA,
-            Self::OutsideModel => OUTSIDE_MODEL,
-            Self::NoDepth(miss) => match miss {
-                DepthMiss::NoAnchor => "keyframe-no-anchor",
-                DepthMiss::AboveHorizon => "keyframe-above-horizon",
-                DepthMiss::OutsideModel => "keyframe-outside-model",
-                DepthMiss::OutsideImage => "keyframe-outside-image",
-                DepthMiss::EmptyView => "keyframe-empty-view",
-                DepthMiss::OutsideHull => "keyframe-outside-hull",
-                DepthMiss::TriangleTooWide => "keyframe-triangle-too-wide",
-                DepthMiss::OcclusionEdge => "keyframe-occlusion-edge",
-                DepthMiss::NoDepth => "keyframe-no-depth",
-                DepthMiss::OutOfRange => "keyframe-depth-out-of-range",
-                DepthMiss::NoSurface => "keyframe-no-surface",
-                DepthMiss::NoTarget => "keyframe-no-target",
-            },
-        }
-    }
-
-    const fn of_frame(no_pose: NoPose) -> Self {
-        match no_pose {
-            NoPose::BeforeStart => Self::BeforeStream,
-            NoPose::AfterEnd => Self::AfterStream,
-            NoPose::Gap { .. } => Self::FrameGap,
-        }
-    }
-
-    const fn of_projection(error: ProjectError) -> Self {
-        match error {
-            ProjectError::BehindCamera => Self::BehindCamera,
-            ProjectError::OutsideModel => Self::OutsideModel,
-        }
-    }
-}
 
 /// Why nothing could be evaluated.
 #[derive(Debug, thiserror::Error)]
