@@ -43,25 +43,25 @@ pub trait Dataset: Send + Sync {
     /// Intrinsics of a camera.
     ///
     /// # Errors
-    /// [`DataError`] if there is no such camera or its calibration cannot be used.
+    /// [`DataError`](crate::error::DataError) if there is no such camera or its calibration cannot be used.
     fn camera(&self, camera: &str) -> DataResult<Camera>;
 
     /// Stamps of a camera's frames, strictly increasing. The position in this list is the frame's index.
     ///
     /// # Errors
-    /// [`DataError`] if there is no such camera or its list of frames cannot be used.
+    /// [`DataError`](crate::error::DataError) if there is no such camera or its list of frames cannot be used.
     fn frames(&self, camera: &str) -> DataResult<Arc<[Stamp]>>;
 
     /// Decodes one image.
     ///
     /// # Errors
-    /// [`DataError`] if the index is out of range or the image cannot be decoded.
+    /// [`DataError`](crate::error::DataError) if the index is out of range or the image cannot be decoded.
     fn image(&self, camera: &str, index: usize) -> DataResult<Image>;
 
     /// The stored file of one image, where it is a PNG or JPEG of its own: a browser shows it without decoding here.
     ///
     /// # Errors
-    /// [`DataError`] if the index is out of range or the file cannot be read.
+    /// [`DataError`](crate::error::DataError) if the index is out of range or the file cannot be read.
     fn image_file(&self, _camera: &str, _index: usize) -> DataResult<Option<Vec<u8>>> {
         Ok(None)
     }
@@ -69,7 +69,7 @@ pub trait Dataset: Send + Sync {
     /// Pose of the camera in the body at a stamp: a function of time, since heads pan and tilt.
     ///
     /// # Errors
-    /// [`DataError`] if there is no such camera or its place is unknown at that stamp.
+    /// [`DataError`](crate::error::DataError) if there is no such camera or its place is unknown at that stamp.
     fn body_from_camera(&self, camera: &str, stamp: Stamp) -> DataResult<BodyFromCamera>;
 
     /// Names of the pose streams, [`GROUND_TRUTH`] among them where there is one.
@@ -78,7 +78,7 @@ pub trait Dataset: Send + Sync {
     /// A pose stream.
     ///
     /// # Errors
-    /// [`DataError`] if there is no such stream or its rows cannot be used.
+    /// [`DataError`](crate::error::DataError) if there is no such stream or its rows cannot be used.
     fn trajectory(&self, stream: &str) -> DataResult<Trajectory>;
 
     /// Whether a pose stream was chained from relative motions: it starts anywhere, and knows no floor.
@@ -89,7 +89,7 @@ pub trait Dataset: Send + Sync {
     /// Inertial samples in the body frame, strictly ordered; empty where the robot has none.
     ///
     /// # Errors
-    /// [`DataError`] if there are samples that cannot be used.
+    /// [`DataError`](crate::error::DataError) if there are samples that cannot be used.
     fn imu(&self) -> DataResult<Arc<[ImuSample]>> {
         Ok(Arc::new([]))
     }
@@ -97,7 +97,7 @@ pub trait Dataset: Send + Sync {
     /// The reference state (pose, velocity, biases) at a stamp, where the data set records or can derive one.
     ///
     /// # Errors
-    /// [`DataError`] if there should be one but it cannot be used.
+    /// [`DataError`](crate::error::DataError) if there should be one but it cannot be used.
     fn inertial_state(&self, _stamp: Stamp) -> DataResult<Option<InertialState>> {
         Ok(None)
     }
@@ -105,7 +105,7 @@ pub trait Dataset: Send + Sync {
     /// The depth image registered to a frame of a camera, where there is one.
     ///
     /// # Errors
-    /// [`DataError`] if there is one but it cannot be decoded.
+    /// [`DataError`](crate::error::DataError) if there is one but it cannot be decoded.
     fn depth_image(&self, _camera: &str, _index: usize) -> DataResult<Option<DepthImage>> {
         Ok(None)
     }
@@ -118,7 +118,7 @@ pub trait Dataset: Send + Sync {
     /// The scan of the scene, where there is one.
     ///
     /// # Errors
-    /// [`DataError`] if its description cannot be used. The points themselves are read by the depth source.
+    /// [`DataError`](crate::error::DataError) if its description cannot be used. The points themselves are read by the depth source.
     fn cloud(&self) -> DataResult<Option<CloudRef>> {
         Ok(None)
     }
@@ -126,7 +126,7 @@ pub trait Dataset: Send + Sync {
     /// The floor as it is known at a key frame. By default z = 0 of the world.
     ///
     /// # Errors
-    /// [`DataError`] if the floor depends on data that is missing at that stamp.
+    /// [`DataError`](crate::error::DataError) if the floor depends on data that is missing at that stamp.
     fn floor(&self, _keyframe: Stamp) -> DataResult<Floor> {
         Ok(Floor::World(Plane::z_zero()))
     }
@@ -148,7 +148,7 @@ pub trait DatasetFactory: Send + Sync {
     /// Opens a data set.
     ///
     /// # Errors
-    /// [`DataError`] that says what is missing or wrong, and where.
+    /// [`DataError`](crate::error::DataError) that says what is missing or wrong, and where.
     fn open(&self, path: &Path, options: &OpenOptions) -> DataResult<Box<dyn Dataset>>;
 }
 
