@@ -102,4 +102,10 @@ pub trait DepthSource: Send + Sync {
         keyframe: &Keyframe<'_>,
         pixels: &[Pixel],
     ) -> DataResult<Vec<Result<DepthSample, DepthMiss>>>;
+
+    /// Share of a depth by which the answers at neighbouring pixels differ by noise alone, one standard deviation: that
+    /// of a scanned cloud. Zero where the surface is smooth, or where depth does not depend on the camera's place.
+    fn roughness(&self) -> f64 {
+        0.0
+    }
 }

@@ -6,8 +6,26 @@
 
 use std::process::ExitCode;
 
-use vice_core::diagnose::{Flaw, VerdictKind};
+use vice_core::diagnose::{Diagnosed, Flaw, VerdictKind};
 use vice_tests::flawed::Flawed;
+
+/// What the size of a flaw is to be found within: see the numbers to reach. Flaws without one count as found.
+fn limits(flaw: Flaw) -> Vec<f64> {
+    match flaw {
+        Flaw::ClockOffset => vec![0.002],
+        Flaw::ExtrinsicRotation => vec![0.1_f64.to_radians()],
+        Flaw::FocalLength => vec![0.002],
+        Flaw::Drift => vec![0.1 * 0.05, 0.1 * 0.4_f64.to_radians()],
+        _ => vec![],
+    }
+}
+
+/// One standard deviation of the error's parts by the intervals of the diagnosis itself.
+fn deviations(flaw: Flaw, diagnosed: &Diagnosed) -> Vec<f64> {
+    let found = diagnosed.document.flaws.iter().find(|part| part.flaw == flaw);
+    let parameters = found.map(|part| part.parameters.iter()).into_iter().flatten();
+    parameters.map(|p| (p.high - p.low) / (2.0 * 1.96)).collect()
+}
 
 fn main() -> ExitCode {
     let mut arguments = std::env::args().skip(1);
@@ -21,10 +39,10 @@ fn main() -> ExitCode {
         Some(flaw) => vec![Some(flaw)],
         None => Flaw::ALL.into_iter().map(Some).chain([None]).collect(),
     };
-    println!("flaw                   depth       right  also  doubt  wrong  none   worst errors");
+    println!("flaw                   depth       right  also  doubt  wrong  none  within   worst errors");
     for (flaw, with_reference) in flaws.iter().flat_map(|f| [(*f, true), (*f, false)]) {
         let mut counts = [0_u32; 5];
-        let mut worst: Vec<f64> = vec![];
+        let (mut worst, mut within): (Vec<f64>, u32) = (vec![], 0);
         for seed in 0..seeds {
             let flawed = Flawed::new(flaw, seed);
             let diagnosed = match flawed.diagnose(with_reference) {
@@ -49,6 +67,14 @@ fn main() -> ExitCode {
             }
             if let Some(flaw) = flaw {
                 let errors = flawed.errors(flaw, &diagnosed);
+                let off = errors.iter().zip(limits(flaw)).any(|(error, limit)| *error >= limit);
+                within += u32::from(!off);
+                if off {
+                    let widths = deviations(flaw, &diagnosed);
+                    eprintln!(
+                        "  seed {seed}: off by {errors:.5?}, one deviation of its intervals is {widths:.5?}"
+                    );
+                }
                 worst.resize(errors.len(), 0.0);
                 worst.iter_mut().zip(errors).for_each(|(w, e)| *w = w.max(e));
             }
@@ -58,7 +84,7 @@ fn main() -> ExitCode {
         let depth = if with_reference { "reference" } else { "camera" };
         let [right, also, doubt, wrong, none] = counts;
         println!(
-            "{name:22} {depth:10} {right:6} {also:5} {doubt:6} {wrong:6} {none:5}   {}",
+            "{name:22} {depth:10} {right:6} {also:5} {doubt:6} {wrong:6} {none:5} {within:7}   {}",
             worst.join(" ")
         );
     }

@@ -171,36 +171,42 @@ fn a_turn_put_into_euroc_is_found() {
     assert!(off < 0.3, "{off} degrees off");
 }
 
-/// The board leans on a wall that the cloud shows: its labels do not fit the ground truth as well as those on the
-/// floor do, and what is put in is found relative to that.
+/// The board leans on a wall, and its depth is that of a cloud with centimetres of noise: its labels do not fit the
+/// ground truth as well as those on the floor do, and what is put in is found relative to that.
 #[test]
-#[ignore = "not met yet: the fit leaves under 1.05 px, but with a turn of 0.76 degrees where a refit by hand has 0.36"]
 fn the_board_of_euroc_is_reported_as_what_it_is() {
     let Some(data) = shared("data/euroc_v1_01") else { return };
     let folder = tempfile::tempdir().unwrap();
     let (calibration, turn) = turned(&data, folder.path());
-    // Without the test for occlusion, as the paper and the oracle have it.
-    let zmap = ["--depth", "zmap", "--zmap-occlusion", "off"];
-    let with = |more: &[&str]| euroc(&data, "board", &[&zmap[..], more].concat());
-    let base = with(&[]);
-    let part = fitted(&base, "extrinsic-rotation");
-    let (before, after) = (base["rmse_px"].as_f64().unwrap(), part["rmse_px"].as_f64().unwrap());
-    // A turn of 0.36 degrees leaves 1.04 px; with the depth asked again on the way, at least as good a one is found.
-    assert!((before - 2.47).abs() < 0.01 && after < 1.05, "{before} {after}");
-    let size = part["size"]["value"].as_f64().unwrap().to_degrees();
-    assert!((0.1..0.4).contains(&size), "{size}");
+    // Without the test for occlusion, as the paper and the oracle have it, and as it is by default.
+    for occlusion in ["off", "on"] {
+        let zmap = ["--depth", "zmap", "--zmap-occlusion", occlusion];
+        let with = |more: &[&str]| euroc(&data, "board", &[&zmap[..], more].concat());
+        let base = with(&[]);
+        let part = fitted(&base, "extrinsic-rotation");
+        let size = part["size"]["value"].as_f64().unwrap().to_degrees();
+        assert!((size - 0.36).abs() < 0.02, "{size}");
+        if occlusion == "off" {
+            let (before, after) = (base["rmse_px"].as_f64().unwrap(), part["rmse_px"].as_f64().unwrap());
+            assert!((before - 2.47).abs() < 0.01 && (after - 1.04).abs() < 0.03, "{before} {after}");
+        }
+        // A principal point and a drift do as well: a rotation is not named at full confidence.
+        assert_ne!(base["verdict"]["kind"], "named", "{}", base["verdict"]);
 
-    let shifted = with(&["--time-offset", "0.05"]);
-    let offset_s = |document: &Value| values(fitted(document, "clock-offset"))[0];
-    let shift_s = offset_s(&shifted) - offset_s(&base);
-    assert!((shift_s - 0.05).abs() < 0.005, "{shift_s}");
+        let shifted = with(&["--time-offset", "0.05"]);
+        assert_eq!(shifted["verdict"]["flaws"][0], "clock-offset", "{}", shifted["verdict"]);
+        let offset_s = |document: &Value| values(fitted(document, "clock-offset"))[0];
+        let shift_s = offset_s(&shifted) - offset_s(&base);
+        assert!((shift_s - 0.05).abs() < 0.005, "{shift_s}");
 
-    let wrong = with(&["--calibration", text(&calibration)]);
-    // used = true · Exp(own) · Exp(turn)
-    let exp = |v: Vector3<f64>| nalgebra::UnitQuaternion::from_scaled_axis(v);
-    let found = exp(rotation(&base)).inverse() * exp(rotation(&wrong));
-    let off = (found.inverse() * exp(turn)).angle().to_degrees();
-    assert!(off < 0.1, "{off} degrees off");
+        let wrong = with(&["--calibration", text(&calibration)]);
+        assert_eq!(wrong["verdict"]["flaws"][0], "extrinsic-rotation", "{}", wrong["verdict"]);
+        // used = true · Exp(own) · Exp(turn)
+        let exp = |v: Vector3<f64>| nalgebra::UnitQuaternion::from_scaled_axis(v);
+        let found = exp(rotation(&base)).inverse() * exp(rotation(&wrong));
+        let off = (found.inverse() * exp(turn)).angle().to_degrees();
+        assert!(off < 0.1, "{off} degrees off");
+    }
 }
 
 #[test]

@@ -16,14 +16,9 @@ use super::numbers::mean_by_frame;
 
 /// The timeline that everything is on: nanoseconds of the data set's clock.
 const TIMELINE: &str = "time";
-const LABEL: rerun::Color = rerun::Color::from_rgb(0, 114, 178);
-const REFERENCE: rerun::Color = rerun::Color::from_rgb(213, 94, 0);
-const ESTIMATES: [rerun::Color; 4] = [
-    rerun::Color::from_rgb(0, 158, 115),
-    rerun::Color::from_rgb(204, 121, 167),
-    rerun::Color::from_rgb(240, 228, 66),
-    rerun::Color::from_rgb(86, 180, 233),
-];
+const LABEL: [u8; 3] = [0, 114, 178];
+const REFERENCE: [u8; 3] = [213, 94, 0];
+const ESTIMATES: [[u8; 3]; 4] = [[0, 158, 115], [204, 121, 167], [240, 228, 66], [86, 180, 233]];
 
 /// Writes the recording; it takes its name when it is complete. Images that cannot be had are warned about and left out.
 pub(crate) fn write(path: &Path, document: &ResultDocument, dataset: &dyn Dataset) -> anyhow::Result<()> {
@@ -81,12 +76,13 @@ fn log_points(recording: &RecordingStream, marks: &Marks, frame: &FrameMarks) ->
     let labels: Vec<_> =
         frame.iter().filter_map(|(name, mark)| Some((place(mark.label_px?), name.0.to_string()))).collect();
     let (places, names): (Vec<_>, Vec<_>) = labels.into_iter().unzip();
-    let points = rerun::Points2D::new(places).with_colors([LABEL]).with_radii([4.0]).with_labels(names);
+    let points =
+        rerun::Points2D::new(places).with_colors([colour(LABEL)]).with_radii([4.0]).with_labels(names);
     recording.log(entity_path!["camera", "image", "label"], &points)?;
     for (index, carrier) in marks.carriers.iter().enumerate() {
         let carried = frame.values().flat_map(|m| m.carried.iter().filter(|c| c.0 == index));
         let places: Vec<_> = carried.map(|c| place(c.1)).collect();
-        let points = rerun::Points2D::new(places).with_colors([colour(carrier)]).with_radii([3.0]);
+        let points = rerun::Points2D::new(places).with_colors([colour(colour_of(carrier))]).with_radii([3.0]);
         recording.log(entity_path!["camera", "image", carrier.name.as_str()], &points)?;
     }
     Ok(())
@@ -100,7 +96,7 @@ fn log_world(recording: &RecordingStream, document: &ResultDocument) -> anyhow::
             let Some(point) = keyframe.point_world_m else { continue };
             at(recording, keyframe.timestamp_ns);
             let path = entity_path!["world", "points", part.depth.as_str(), &*keyframe.point.0];
-            let points = rerun::Points3D::new([f32s(point)]).with_colors([LABEL]).with_radii([0.02]);
+            let points = rerun::Points3D::new([f32s(point)]).with_colors([colour(LABEL)]).with_radii([0.02]);
             recording.log(path, &points)?;
         }
     }
@@ -139,6 +135,10 @@ fn log_errors(recording: &RecordingStream, document: &ResultDocument) -> anyhow:
     Ok(())
 }
 
-fn colour(carrier: &Carrier) -> rerun::Color {
+fn colour_of(carrier: &Carrier) -> [u8; 3] {
     carrier.estimate.map_or(REFERENCE, |index| ESTIMATES[index % ESTIMATES.len()])
+}
+
+fn colour([red, green, blue]: [u8; 3]) -> rerun::Color {
+    rerun::Color::from_rgb(red, green, blue)
 }

@@ -28,6 +28,9 @@ pub(super) struct Cell {
     pub(super) labels: Vec<usize>,
     /// Seconds since the key frame, one for each label.
     pub(super) seconds: Vec<f64>,
+    /// Where the depth error of its segment stands among the residuals, if this is the segment's first cell and the depth
+    /// is rough.
+    pub(super) pull: Option<usize>,
 }
 
 /// Labels by block of time, by point and by segment.
@@ -68,12 +71,24 @@ impl Blocks {
                     block,
                     labels: piece.to_vec(),
                     seconds: piece.iter().map(seconds).collect(),
+                    pull: None,
                 })
                 .collect();
             pieces
         });
         let cells = cells.collect();
         Self { by_time, cells, of_keyframes }
+    }
+
+    /// With the depth errors of segments, which stand behind the residuals of the labels.
+    pub(super) fn with_pulls(mut self, segments: &[Vec<usize>]) -> Self {
+        let labels: usize = self.cells.iter().map(|cell| cell.labels.len()).sum();
+        let firsts: BTreeMap<usize, usize> =
+            segments.iter().enumerate().filter_map(|(i, s)| Some((*s.first()?, labels + i))).collect();
+        for cell in &mut self.cells {
+            cell.pull = cell.labels.first().and_then(|first| firsts.get(first)).copied();
+        }
+        self
     }
 
     /// Median time since the key frame, seconds.

@@ -81,7 +81,8 @@ pub struct FlawPart {
     /// The length of its vector, where it is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size: Option<Estimated>,
-    /// RMSE_2D with it taken out, pixels.
+    /// RMSE_2D with it taken out, pixels. Of a rough depth (a Z-map) the better of that with the depth as it was and that
+    /// with depth asked again: what the evaluation then gives holds the noise of other triangles.
     pub rmse_px: f64,
     /// Share of the mean squared error that goes with it, percent.
     pub explained_percent: f64,

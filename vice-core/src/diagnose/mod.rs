@@ -17,6 +17,7 @@ mod motion;
 mod noise;
 mod observability;
 mod problem;
+mod rough;
 mod sensitivity;
 mod solve;
 mod theta;
@@ -175,7 +176,7 @@ impl<'a> Alone<'a> {
         let Diagnosis { evaluation, stream, depth, inertial, .. } = *diagnosis;
         let flaws = flaws_of(diagnosis)?;
         let problem = Problem::new(evaluation, stream, depth, inertial)?;
-        let blocks = Blocks::new(&problem.labels);
+        let blocks = Blocks::new(&problem.labels).with_pulls(&problem.rough_segments);
         let labels = labels_part(&problem, &blocks);
         check_labels(&labels)?;
         let mut done = 0;

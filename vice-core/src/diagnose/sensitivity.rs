@@ -126,7 +126,7 @@ fn curve(problem: &Problem<'_>, parameter: usize) -> Result<Vec<CurvePoint>, Dia
         for sign in [-1.0, 1.0] {
             let mut theta = Theta::zero();
             theta[parameter] = sign * size;
-            sum += rmse_px(&problem.residuals(&theta)?).powi(2);
+            sum += rmse_px(&problem.scored(&theta, &theta)?).powi(2);
         }
         points.push(CurvePoint { size, rmse_px: (0.5 * sum).sqrt() });
     }

@@ -16,6 +16,8 @@ const MAX_STEPS: usize = 40;
 const WIDTHS: [f64; 3] = [16.0, 4.0, 1.0];
 /// A step shorter than this share of the typical size of each parameter is the last.
 const CONVERGED: f64 = 1e-4;
+/// Rough depth is asked again at most so often after a solution has moved it.
+const MOST_ASKED: usize = 3;
 /// Clock offsets that are tried before the first step, seconds: a wrong one is a valley of its own.
 const FIRST_OFFSETS_S: f64 = 0.6;
 const OFFSET_STEP_S: f64 = 0.05;
@@ -29,7 +31,11 @@ pub(super) struct Fit {
     pub(super) parameters: Vec<usize>,
     /// Where it ended.
     pub(super) theta: Theta,
-    /// Residuals there.
+    /// Where rough depth was asked.
+    pub(super) asked_at: Theta,
+    /// RMSE_2D there, pixels: with rough depth the better of that with depth as asked and asked again there.
+    pub(super) rmse_px: f64,
+    /// Fitted residuals there.
     pub(super) residuals: Vec<Residual>,
     /// Derivatives there: one column for each parameter.
     pub(super) jacobian: Vec<Vec<Residual>>,
@@ -69,11 +75,13 @@ impl Normal {
 impl Fit {
     /// No flaw: nothing is free.
     pub(super) fn of_nothing(problem: &Problem<'_>, blocks: &Blocks) -> Self {
-        let residuals = problem.base.clone();
+        let residuals = problem.base_fitted.clone();
         Self {
             flaws: vec![],
             parameters: vec![],
             theta: Theta::zero(),
+            asked_at: Theta::zero(),
+            rmse_px: rmse_px(&problem.base),
             noise: Noise::of(&residuals, blocks),
             residuals,
             jacobian: vec![],
@@ -81,38 +89,64 @@ impl Fit {
         }
     }
 
-    /// Fits some flaws together, from a start.
+    /// Fits some flaws together, from where another fit ended.
     pub(super) fn solve(
         problem: &Problem<'_>,
         blocks: &Blocks,
         flaws: &[Flaw],
-        start: &Theta,
+        start: &Self,
     ) -> Result<Self, DiagnoseError> {
         let mut fit = Self {
             flaws: flaws.to_vec(),
             parameters: flaws.iter().copied().flat_map(Flaw::parameters).collect(),
             theta: first_theta(problem, flaws, start)?,
+            asked_at: start.asked_at,
             ..Self::of_nothing(problem, blocks)
         };
-        fit.residuals = problem.residuals(&fit.theta)?;
+        fit.residuals = problem.residuals(&fit.theta, &fit.asked_at)?;
         let moves_depth =
             |flaw: &Flaw| !matches!(flaw, Flaw::ClockOffset | Flaw::InitialTilt | Flaw::Scale | Flaw::Drift);
-        let widths: &[f64] =
-            if flaws.iter().any(moves_depth) { &WIDTHS } else { &WIDTHS[WIDTHS.len() - 1..] };
+        let bumpy = problem.rough_segments.is_empty() && flaws.iter().any(moves_depth);
+        fit.descend(problem, blocks, if bumpy { &WIDTHS } else { &WIDTHS[WIDTHS.len() - 1..] })?;
+        for _ in 0..MOST_ASKED {
+            if !problem.depth_moved(&fit.theta, &fit.asked_at)? {
+                break;
+            }
+            fit.asked_at = fit.theta;
+            fit.residuals = problem.residuals(&fit.theta, &fit.asked_at)?;
+            fit.descend(problem, blocks, &WIDTHS[WIDTHS.len() - 1..])?;
+        }
+        // The last step moved the residuals away from their derivatives and pieces.
+        fit.jacobian = problem.jacobian(&fit.theta, &fit.asked_at, &fit.parameters, 1.0)?;
+        let whiteners = fit.reweighted(blocks);
+        fit.pieces = fit.pieces_with(blocks, &whiteners);
+        fit.rmse_px = match problem.rough_segments.is_empty() {
+            true => rmse_px(&fit.residuals),
+            false => {
+                let [held, asked] = [&fit.asked_at, &fit.theta].map(|at| problem.scored(&fit.theta, at));
+                rmse_px(&held?).min(rmse_px(&asked?))
+            }
+        };
+        Ok(fit)
+    }
+
+    /// Steps down until none is left to take, by differences of one width after the other.
+    fn descend(
+        &mut self,
+        problem: &Problem<'_>,
+        blocks: &Blocks,
+        widths: &[f64],
+    ) -> Result<(), DiagnoseError> {
         for wider in widths {
             let mut damping = 1e-4;
             for _ in 0..MAX_STEPS {
-                fit.jacobian = problem.jacobian(&fit.theta, &fit.parameters, *wider)?;
-                if !fit.step(problem, blocks, &mut damping)? {
+                self.jacobian = problem.jacobian(&self.theta, &self.asked_at, &self.parameters, *wider)?;
+                if !self.step(problem, blocks, &mut damping)? {
                     break;
                 }
             }
         }
-        // The last step moved the residuals away from their derivatives and pieces.
-        fit.jacobian = problem.jacobian(&fit.theta, &fit.parameters, 1.0)?;
-        let whiteners = fit.reweighted(blocks);
-        fit.pieces = fit.pieces_with(blocks, &whiteners);
-        Ok(fit)
+        Ok(())
     }
 
     /// One accepted step; false where none is left to take.
@@ -146,7 +180,7 @@ impl Fit {
             }
             let small = |(p, d): (&usize, &f64)| d.abs() < CONVERGED * PARAMETERS[*p].typical;
             let last = self.parameters.iter().zip(delta.iter()).all(small);
-            match problem.residuals(&theta) {
+            match problem.residuals(&theta, &self.asked_at) {
                 Ok(residuals) if cost(&residuals, &theta) < now => {
                     (self.theta, self.residuals) = (theta, residuals);
                     *damping = (*damping / 10.0).max(1e-9);
@@ -176,6 +210,14 @@ impl Fit {
             .zip(whiteners)
             .map(|(cell, whitener)| {
                 let mut piece = Normal::zeros(self.parameters.len());
+                if let Some(pull) = cell.pull {
+                    let row = DVector::from_iterator(
+                        self.parameters.len(),
+                        self.jacobian.iter().map(|column| column[pull].x),
+                    );
+                    piece.gradient += &row * self.residuals[pull].x;
+                    piece.hessian += &row * row.transpose();
+                }
                 let Some(whitener) = whitener else { return piece };
                 for axis in [0, 1] {
                     let columns = whitener.apply(self.columns(cell, axis));
@@ -218,12 +260,21 @@ impl Fit {
 
     /// RMSE_2D with the flaws taken out.
     pub(super) fn rmse_px(&self) -> f64 {
-        rmse_px(&self.residuals)
+        self.rmse_px
+    }
+
+    /// The depth error of a cell's segment in its deviations, the fit moved by a step; zero where it has none.
+    pub(super) fn pull(&self, cell: &Cell, step: &DVector<f64>) -> f64 {
+        cell.pull.map_or(0.0, |pull| {
+            let moved: f64 = self.jacobian.iter().zip(step.iter()).map(|(c, s)| c[pull].x * s).sum();
+            self.residuals[pull].x + moved
+        })
     }
 }
 
 /// The start, with the best of a coarse row of clock offsets where that is free.
-fn first_theta(problem: &Problem<'_>, flaws: &[Flaw], start: &Theta) -> Result<Theta, DiagnoseError> {
+fn first_theta(problem: &Problem<'_>, flaws: &[Flaw], start: &Fit) -> Result<Theta, DiagnoseError> {
+    let Fit { theta: start, asked_at, .. } = start;
     if !flaws.contains(&Flaw::ClockOffset) || start.of(Flaw::ClockOffset)[0] != 0.0 {
         return Ok(*start);
     }
@@ -231,7 +282,7 @@ fn first_theta(problem: &Problem<'_>, flaws: &[Flaw], start: &Theta) -> Result<T
     let mut best = (f64::INFINITY, *start);
     for step in -steps..=steps {
         let theta = start.with(Flaw::ClockOffset, &[f64::from(step) * OFFSET_STEP_S]);
-        let cost = match problem.residuals(&theta) {
+        let cost = match problem.residuals(&theta, asked_at) {
             // Lengths, not squares: outliers must not choose the valley.
             Ok(residuals) => residuals.iter().map(|r| r.norm()).sum(),
             Err(DiagnoseError::CannotEvaluate(_)) => f64::INFINITY,
@@ -251,5 +302,6 @@ fn squares(residuals: &[Residual], blocks: &Blocks, whiteners: &[Option<Whitener
         let both = [0, 1].map(|axis| coordinate(residuals, cell, axis));
         Some(whitener.as_ref()?.apply(DMatrix::from_columns(&both)).norm_squared())
     });
-    whitened.sum()
+    let pulls = blocks.cells.iter().filter_map(|cell| cell.pull).map(|pull| residuals[pull].x.powi(2));
+    whitened.sum::<f64>() + pulls.sum::<f64>()
 }

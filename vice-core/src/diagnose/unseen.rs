@@ -33,7 +33,8 @@ fn loss(fit: &Fit, cell: &Cell, step: &DVector<f64>, whitener: Option<&Whitener>
         coordinate(&fit.residuals, cell, axis) + columns * step
     });
     let both = whitener.apply(DMatrix::from_columns(&moved));
-    both.row_iter().map(|row| huber_loss(row.norm())).sum()
+    let pull = huber_loss(fit.pull(cell, step).abs());
+    both.row_iter().map(|row| huber_loss(row.norm())).sum::<f64>() + pull
 }
 
 /// Half the squared length up to [`HUBER`], linear beyond.

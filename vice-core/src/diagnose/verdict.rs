@@ -5,7 +5,6 @@ use super::flaw::Flaw;
 use super::noise::Noise;
 use super::problem::{Problem, rmse_px};
 use super::solve::Fit;
-use super::theta::Theta;
 use super::unseen::{Ruler, Unseen};
 use super::{DiagnoseError, Options};
 
@@ -115,7 +114,7 @@ impl Judge<'_> {
         others
             .map(|flaw| {
                 let together: Vec<Flaw> = fit.flaws.iter().copied().chain([*flaw]).collect();
-                Ok(self.candidate(Fit::solve(self.problem, self.blocks, &together, &fit.theta)?))
+                Ok(self.candidate(Fit::solve(self.problem, self.blocks, &together, fit)?))
             })
             .collect()
     }
@@ -129,8 +128,9 @@ pub(super) fn singles(
     mut done: impl FnMut(),
 ) -> Result<Vec<Fit>, DiagnoseError> {
     let mut fits = Vec::new();
+    let nothing = Fit::of_nothing(problem, blocks);
     for flaw in flaws {
-        match Fit::solve(problem, blocks, &[*flaw], &Theta::zero()) {
+        match Fit::solve(problem, blocks, &[*flaw], &nothing) {
             Ok(fit) => fits.push(fit),
             Err(DiagnoseError::CannotEvaluate(why)) => tracing::warn!("{flaw} is not looked for: {why}"),
             Err(error) => return Err(error),

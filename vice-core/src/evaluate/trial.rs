@@ -4,7 +4,7 @@ use super::score::score;
 pub(crate) use super::streams::PosesAtFrames;
 use super::{DepthTable, EvaluateError, Evaluation, extrinsics, keyframe_depths};
 use crate::camera::Camera;
-use crate::depth::DepthSource;
+use crate::depth::{DepthSample, DepthSource};
 use crate::error::DataResult;
 use crate::frames::BodyFromCamera;
 use crate::metrics::align::Alignment;
@@ -16,6 +16,22 @@ pub(crate) type CamerasAtFrames = Vec<Option<BodyFromCamera>>;
 
 /// Depths of the key-frame pixels, to be used with several trials.
 pub(crate) struct TrialDepths(DepthTable);
+
+impl TrialDepths {
+    /// All of them longer by a factor.
+    pub(crate) fn times(&self, factor: f64) -> Self {
+        let longer = |sample: DepthSample| DepthSample { z_m: factor * sample.z_m, ..sample };
+        Self(self.0.iter().map(|(at, depth)| (*at, depth.map(longer))).collect())
+    }
+
+    /// The median of the shares by which they differ from others, where both have one; zero where none has.
+    pub(crate) fn typical_change(&self, other: &Self) -> f64 {
+        let pairs = self.0.iter().filter_map(|(at, depth)| Some((depth.ok()?, other.0.get(at)?.ok()?)));
+        let mut changes: Vec<f64> = pairs.map(|(a, b)| (a.z_m / b.z_m).ln().abs()).collect();
+        changes.sort_by(f64::total_cmp);
+        changes.get(changes.len() / 2).copied().unwrap_or(0.0)
+    }
+}
 
 /// The stages of an evaluation, one by one.
 pub(crate) struct Trial<'a> {
