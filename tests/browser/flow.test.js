@@ -1,13 +1,14 @@
 // A person's way through the page, with the real program behind it.
 
 import assert from "node:assert/strict";
-import { readdirSync, truncateSync } from "node:fs";
+import { mkdirSync, readdirSync, readFileSync, rmdirSync, truncateSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 
 import { browser, flight, observation, scratch, Server, truth, Window } from "./harness.js";
 
 /** @import {Browser} from "playwright-core" */
+/** @import {State} from "../../vice-annotate/page/types.js" */
 
 const BROKEN = 13;
 const BY_HAND = 20;
@@ -268,6 +269,60 @@ test("names are shown as text, whatever they hold", async () => {
   assert.equal(await page.locator("img").count(), 0);
   await first.press("Control+z");
   await server.until("it has its old name again", ({ points }) => points.some((each) => each.name === "3"));
+});
+
+test("labels go out as files and come in again", async () => {
+  const { page } = first;
+  const before = await server.state();
+  const menu = page.locator("#file-menu summary");
+  const folder = scratch();
+  for (const [link, ending] of [["Export JSON", "json"], ["Export CSV", "csv"], ["Export CVAT XML", "xml"]]) {
+    await menu.click();
+    const [download] = await Promise.all([page.waitForEvent("download"), page.getByRole("link", { name: link, exact: true }).click()]);
+    assert.equal(download.suggestedFilename(), `my.${ending}`);
+    const file = join(folder, `my.${ending}`);
+    await download.saveAs(file);
+    await page.setInputFiles("#import", file);
+    await first.told("there are points of the same names already: 1, 2, 3, 4, 5");
+    await page.locator("#notes").getByRole("button", { name: "Close this note" }).first().click();
+    await first.press("1", "Shift+D");
+    await server.until("point 1 is cut short", ({ points }) => points[0].observations.length < before.points[0].observations.length);
+    await menu.click();
+    await page.check("#import-replace");
+    await page.setInputFiles("#import", file);
+    await first.told(`my.${ending} is imported`);
+    // Only JSON says how sure the tracker was; CVAT counts from the corner of a pixel.
+    const comparable = (/** @type {State} */ { points }) => ending === "json" ? points : points.map(({ name, observations }) =>
+      [name, observations.map(({ frame, u, v, source, keyframe, occluded, uncertain }) => [frame, u.toFixed(9), v.toFixed(9), source, keyframe, occluded, uncertain])]);
+    assert.deepEqual(comparable(await server.state()), comparable(before), ending);
+    await menu.click();
+    await page.uncheck("#import-replace");
+    await menu.click();
+  }
+  await page.setInputFiles("#import", { name: "my.tiff", mimeType: "image/tiff", buffer: Buffer.from("no labels") });
+  await first.told("labels come as .json, .csv, .xml (CVAT) or .pkl");
+  await page.setInputFiles("#import", { name: "my.pkl", mimeType: "", buffer: Buffer.from("no pickle") });
+  await first.told("my.pkl: ");
+  // The browser itself reports the refused requests.
+  first.complaints = first.complaints.filter((line) => !/409|422/.test(line));
+});
+
+test("a labels file that cannot be written is told at once, and that it is written again", async () => {
+  const dataset = flight(1);
+  const file = join(scratch(), "held.json");
+  const own = await Server.start(dataset, file);
+  const window = await Window.open(chromium, own);
+  // No file can take the place of a folder.
+  mkdirSync(file);
+  const { x, y } = await window.place({ u: 200, v: 200 }, await own.state());
+  await window.page.mouse.click(x, y);
+  await window.told("The labels are safe in the journal, but the file is behind");
+  await window.screenshot("11-file-behind");
+  rmdirSync(file);
+  await window.page.locator("#banners").getByText("the file is behind").waitFor({ state: "detached" });
+  await window.close();
+  await own.end();
+  assert.equal(JSON.parse(readFileSync(file, "utf8")).points.length, 1);
 });
 
 test("a reload shows the same labels", async () => {

@@ -65,6 +65,18 @@ test("a change is applied once and in order", () => {
   assert.equal(labels.apply(change), "known");
 });
 
+test("a point that is just being placed has its name, whatever happens to others meanwhile", () => {
+  const labels = new Labels(state([]));
+  labels.replace({ ...state([]), points: [] });
+  labels.hope("1", 0, { u: 1, v: 2 });
+  assert.equal(labels.freeName(), "2");
+  labels.apply({ revision: 8, points: [{ name: "7", observations: [seen(4)] }], removed: [], can_undo: true, can_redo: false, by: "track", label: "" });
+  assert.equal(labels.freeName(), "2");
+  assert.deepEqual(labels.pixel("1", 0), { u: 1, v: 2 });
+  labels.apply({ revision: 9, points: [{ name: "1", observations: [seen(0)] }], removed: [], can_undo: true, can_redo: false, by: "edit", label: "" });
+  assert.equal(labels.pixel("1", 0)?.u, 100);
+});
+
 test("doubtful frames are found in both directions, whichever lane they are in", () => {
   const labels = new Labels(state([seen(2, { confidence: 0.3 }), seen(4), seen(18, { uncertain: true, confidence: null })]));
   assert.deepEqual(labels.doubtfulFrom(1, 1, "1"), { place: 9, name: "1" });

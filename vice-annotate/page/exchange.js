@@ -35,7 +35,7 @@ export function bringIn(app, tell) {
     const body = format === "pickle"
       ? /** @type {const} */ ({ content: base64(await file.arrayBuffer()), encoding: "base64", replace })
       : /** @type {const} */ ({ content: await file.text(), encoding: "text", replace });
-    if (await app.session.bringIn(format, body)) {
+    if (await app.session.bringIn(format, body, file.name)) {
       tell("info", `${file.name} is imported; undo takes it out again.`);
       app.select(app.labels.names[0] ?? "1");
     }

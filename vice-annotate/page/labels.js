@@ -6,6 +6,9 @@ const DOUBT_BELOW = 0.5;
 /** How near the border, as a part of the image's width, a point is taken to have left the image. */
 const BORDER = 0.04;
 
+/** @param {string} key of a hope: frame and point @returns {string} the point */
+const hopedPoint = (key) => key.slice(key.indexOf(" ") + 1);
+
 export class Labels {
   /** @param {State} state */
   constructor(state) {
@@ -65,7 +68,9 @@ export class Labels {
       this.#index(point);
     }
     state.points.sort((a, b) => a.name.localeCompare(b.name, "en", { numeric: true }));
-    this.hopes.clear();
+    // What is hoped of other points is still on its way.
+    const told = new Set([...change.removed, ...change.points.map(({ name }) => name)]);
+    for (const key of this.hopes.keys()) if (told.has(hopedPoint(key))) this.hopes.delete(key);
     return "applied";
   }
 
@@ -167,10 +172,11 @@ export class Labels {
     return uncertain || (confidence !== null && confidence < (this.state.doubt_below ?? DOUBT_BELOW));
   }
 
-  /** @returns {string} a name that no point has: the smallest free number */
+  /** @returns {string} a name that no point has, nor one that is just being placed: the smallest free number */
   freeName() {
+    const hoped = new Set([...this.hopes.keys()].map(hopedPoint));
     let number = 1;
-    while (this.lanes.has(String(number))) number += 1;
+    while (this.lanes.has(String(number)) || hoped.has(String(number))) number += 1;
     return String(number);
   }
 

@@ -109,16 +109,17 @@ export class Session {
 
   /**
    * @param {unknown} error
+   * @param {string} [about] what was refused, where the user may wonder
    * @returns {Promise<false>}
    */
-  async #refused(error) {
+  async #refused(error, about = "") {
     if (!(error instanceof ServerError)) throw error;
     this.labels.hopes.clear();
     if (error.stale) {
       await this.reload().catch(() => undefined);
       this.listener.tell("warning", "Not done: the labels had changed elsewhere first. They have been read again; look, then repeat.");
     } else {
-      this.listener.tell("error", error.hint ? `${error.message} — ${error.hint}` : error.message);
+      this.listener.tell("error", about + (error.hint ? `${error.message} — ${error.hint}` : error.message));
     }
     this.listener.changed();
     return false;
@@ -233,15 +234,16 @@ export class Session {
   /**
    * @param {string} format
    * @param {{content: string, encoding: "text" | "base64", replace: boolean}} body
+   * @param {string} name of the file
    * @returns {Promise<boolean>}
    */
-  bringIn(format, body) {
+  bringIn(format, body, name) {
     return this.#write(async () => {
       try {
         await this.#answered(await postImport(format, body));
         return true;
       } catch (error) {
-        return this.#refused(error);
+        return this.#refused(error, `${name}: `);
       }
     });
   }

@@ -80,6 +80,16 @@ impl CameraFrames {
         }
     }
 
+    /// The file of a frame, where it was unpacked.
+    pub(crate) fn image_file(&self, index: usize) -> DataResult<Option<Vec<u8>>> {
+        match &self.source {
+            Source::Pictures { files, .. } if index < files.len() => {
+                image_file::read_bytes(&files[index]).map(Some)
+            }
+            _ => Ok(None),
+        }
+    }
+
     /// Decodes a frame.
     pub(crate) fn image(&self, index: usize) -> DataResult<Image> {
         let frames = self.frames()?;

@@ -150,6 +150,10 @@ impl Dataset for BlackbirdDataset {
         self.find(camera)?.image(index)
     }
 
+    fn image_file(&self, camera: &str, index: usize) -> DataResult<Option<Vec<u8>>> {
+        self.find(camera)?.image_file(index)
+    }
+
     fn body_from_camera(&self, camera: &str, _stamp: Stamp) -> DataResult<BodyFromCamera> {
         ned::body_from_camera(self.find(camera)?.folder.side)
     }

@@ -154,6 +154,11 @@ impl Dataset for RosDataset {
         self.decode(color, index, pixels::image)
     }
 
+    fn image_file(&self, camera: &str, index: usize) -> DataResult<Option<Vec<u8>>> {
+        let color = self.color(camera)?;
+        self.decode(color, index, pixels::file)
+    }
+
     fn body_from_camera(&self, camera: &str, stamp: Stamp) -> DataResult<BodyFromCamera> {
         self.color(camera)?;
         if let Some(fixed) = &self.fixed_camera {

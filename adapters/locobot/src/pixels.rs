@@ -51,6 +51,20 @@ pub(crate) fn image(mut reader: Reader<'_>, packing: Packing) -> DataResult<Imag
     }
 }
 
+/// The PNG or JPEG that a message holds as it is; `None` where it holds raw pixels.
+///
+/// # Errors
+/// [`DataError`] for a message that is cut off.
+pub(crate) fn file(mut reader: Reader<'_>, packing: Packing) -> DataResult<Option<Vec<u8>>> {
+    match packing {
+        Packing::Compressed => {
+            compressed_head(&mut reader).map_err(broken)?;
+            Ok(Some(reader.bytes().map_err(broken)?.to_vec()))
+        }
+        Packing::Raw => Ok(None),
+    }
+}
+
 /// Decodes a message as a depth image.
 ///
 /// # Errors

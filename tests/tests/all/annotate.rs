@@ -402,6 +402,15 @@ fn labels_come_in_and_go_out_again() {
     bad(&import("point,timestamp_ns,u_px,v_px,keyframe\n9,5,1,1,1\n"), 422, "line 2");
     bad(&import(&format!("point,timestamp_ns,u_px,v_px,keyframe\n9,{},1,900,1\n", stamp(0))), 422, "outside");
     bad(&import("nonsense"), 422, "column point is missing");
+    // {'p': {1L: (array('<f4', [1.0, 2.0]), 1)}} as Python 2 wrote it in protocol 0.
+    let authors = "(dp0\nS'p'\np1\n(dp2\nL1L\n(cnumpy.core.multiarray\n_reconstruct\np3\n(cnumpy\nndarray\np4\n(I0\ntS'b'\n\
+        tRp5\n(I1\n(I2\ntcnumpy\ndtype\np6\n(S'f4'\nI0\nI1\ntRp7\n(I3\nS'<'\nNNNI-1\nI-1\nI0\ntbI00\n\
+        S'\\x00\\x00\\x80?\\x00\\x00\\x00@'\ntbI1\ntss.";
+    let pickle = json!({ "content": authors, "encoding": "text" }).to_string();
+    let change = good(annotator.post("/api/import?format=pickle", &pickle));
+    let o = &change["points"][0]["observations"][0];
+    assert_eq!((&o["frame"], &o["u"], &o["v"]), (&json!(1), &json!(1.0), &json!(2.0)), "{change}");
+    assert_eq!((&o["keyframe"], &o["source"]), (&json!(true), &json!("manual")), "{change}");
     // {0: {1: (array([3., 4.]), True)}} would be longer; what is no pickle at all is refused as such.
     let pickle = json!({ "content": "gARdlC4=", "encoding": "base64" }).to_string();
     bad(&annotator.post("/api/import?format=pickle", &pickle), 422, "no dictionary");

@@ -209,6 +209,23 @@ fn a_motion_capture_file_is_the_ground_truth() {
 }
 
 #[test]
+fn compressed_images_are_given_as_they_are_stored() {
+    let Some(folder) = vice_tests::shared("data/locobot") else { return };
+    for (name, stored) in [("locobot_ros1_compressed.bag", true), ("locobot_ros1.bag", false)] {
+        let run = Locobot.open(&folder.join(name), &OpenOptions::default()).unwrap();
+        let camera = run.cameras().remove(0);
+        for index in [0, 3] {
+            let file = run.image_file(&camera, index).unwrap();
+            assert_eq!(file.is_some(), stored, "{name}");
+            let Some(file) = file else { continue };
+            let image = vice_files::image_file::decode(&file).unwrap();
+            assert_eq!(image.data(), run.image(&camera, index).unwrap().data());
+        }
+        assert!(run.image_file(&camera, 1_000_000).is_err(), "{name}");
+    }
+}
+
+#[test]
 fn a_folder_of_recordings_is_a_collection() {
     let Some(folder) = vice_tests::shared("data/locobot") else { return };
     let Probe::Collection(paths) = Locobot.probe(&folder) else { panic!("five recordings") };

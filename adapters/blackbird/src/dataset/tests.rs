@@ -132,6 +132,8 @@ fn unpacked_images_are_read_directly() {
     let dataset = f.open();
     assert_eq!(dataset.image("left_gray", 2).unwrap().data()[0], 2);
     assert!(text(dataset.image("left_gray", 3)).contains("no frame 3, the camera has 3"));
+    let stored = fs::read(folder.join(format!("{:010}.png", 1))).unwrap();
+    assert_eq!(dataset.image_file("left_gray", 1).unwrap(), Some(stored));
     let small = Image::new(2, 1, PixelFormat::Gray8, vec![0; 2]).unwrap();
     fs::write(folder.join("0000000000.png"), image_file::encode_png(&small).unwrap()).unwrap();
     assert!(text(dataset.image("left_gray", 0)).contains("is 2x1 pixels, the camera's are 1024x768"));
