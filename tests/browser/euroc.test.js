@@ -111,6 +111,18 @@ test("targets are found from the panel, by keyboard alone, and taken back", { sk
   assert.ok(found.points.every((point) => point.observations.every(({ source, confidence }) => source === "detected" && confidence !== null)));
   await window.goTo(3);
   await window.screenshot("euroc-6-found");
+  // Of many points the chosen one is in sight, in the list and on the timeline.
+  const last = found.points[found.points.length - 1].name;
+  await window.press("(");
+  await page.waitForFunction((name) => /** @type {HTMLInputElement} */ (document.getElementById("name")).value === name, last);
+  await page.waitForFunction(() => (document.getElementById("timeline-box")?.scrollTop ?? 0) > 500);
+  const row = page.locator("#points .choose[aria-current=true]");
+  assert.ok(await row.evaluate((each) => {
+    const list = each.closest("ul");
+    const inside = list?.getBoundingClientRect();
+    const own = each.getBoundingClientRect();
+    return inside && own.top >= inside.top - 1 && own.bottom <= inside.bottom + 1;
+  }));
   await window.press("Control+z");
   await server.until("all of it is undone", ({ points }) => points.length === 0);
 

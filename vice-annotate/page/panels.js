@@ -31,6 +31,8 @@ export class Panels {
     this.skips = byId("skips", HTMLElement);
     /** What the list of points shows, to build it only on change: a rebuilt button loses the focus. */
     this.listed = "";
+    /** The chosen point when it was last brought into sight. */
+    this.inSight = "";
     /** @type {Projections | null} what the table shows, and for which frame and point */
     this.tabled = null;
     this.tabledFor = "";
@@ -69,6 +71,9 @@ export class Panels {
       here.classList.toggle("doubt", doubtful || app.labels.lostAt(name, app.place));
       setText(here, this.#hereText(name, observation, doubtful));
     }
+    if (this.inSight === app.selected) return;
+    this.inSight = app.selected;
+    this.rows.get(app.selected)?.choose.scrollIntoView({ block: "nearest" });
   }
 
   /**

@@ -30,6 +30,8 @@ export class Timeline {
     this.first = 0;
     this.width = 1;
     this.lanes = document.createElement("canvas");
+    /** The chosen point when its lane was last brought into sight. */
+    this.inSight = "";
     /** What the lanes' canvas shows. */
     this.drawn = "";
     /** @type {unknown} */
@@ -128,6 +130,7 @@ export class Timeline {
       canvas.style.height = `${height}px`;
     }
     this.#followPlayhead();
+    this.#followChosen();
     this.#describe();
     const context = canvas.getContext("2d");
     if (!context) return;
@@ -181,6 +184,18 @@ export class Timeline {
     const { place } = this.app;
     if (this.zoom > 1 && (place < this.first || place >= this.first + shown)) this.first = place - shown / 2;
     this.#keepInSight();
+  }
+
+  /** Scrolls to the lane of a point that was just chosen. */
+  #followChosen() {
+    const { app, box } = this;
+    const index = app.labels.indexOf(app.selected);
+    if (this.inSight === app.selected || index < 0) return;
+    this.inSight = app.selected;
+    const top = RULER + index * LANE;
+    // The first lane brings the ruler along.
+    if (top - RULER < box.scrollTop) box.scrollTop = index === 0 ? 0 : top;
+    else if (top + LANE > box.scrollTop + box.clientHeight) box.scrollTop = top + LANE - box.clientHeight;
   }
 
   #describe() {

@@ -6,6 +6,7 @@
 mod annotate;
 mod annotate_detect;
 mod annotate_kill;
+mod annotate_reach;
 mod annotator;
 mod bad_input;
 mod batch;
