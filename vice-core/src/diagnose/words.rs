@@ -55,12 +55,15 @@ fn axes(parameters: &[&Estimated], scale: f64, unit: &str) -> String {
     format!("{}{space}{unit}", axes.join(", "))
 }
 
+/// An interval of exact data has no width worth the digits.
+const MOST_DECIMALS: f64 = 3.0;
+
 /// Two digits of the width of the interval are worth reading.
 fn decimals(width: f64) -> usize {
     if !(width > 0.0 && width.is_finite()) {
         return 3;
     }
-    (1.0 - width.log10().floor()).clamp(0.0, 6.0) as usize
+    (1.0 - width.log10().floor()).clamp(0.0, MOST_DECIMALS) as usize
 }
 
 /// What to do about a flaw, given the clock offset that was in use.
