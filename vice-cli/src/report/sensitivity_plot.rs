@@ -18,7 +18,12 @@ pub(crate) fn draw(document: &SensitivityDocument) -> String {
     let panels: Vec<&[Curve]> =
         document.curves.chunk_by(|a, b| a.flaw == b.flaw && shown_unit(a).0 == shown_unit(b).0).collect();
     let mut picture = Picture::new(WIDTH, TOP + PANEL_PITCH * panels.len() as f64);
-    picture.text("title", (12.0, 18.0), Anchor::Start, "RMSE_2D with each flaw injected");
+    picture.text(
+        "title",
+        (12.0, 18.0),
+        Anchor::Start,
+        "RMSE_2D with each flaw injected; dashed: from here on a diagnosis finds it",
+    );
     for (index, curves) in panels.iter().enumerate() {
         draw_panel(&mut picture, document, curves, TOP + PANEL_PITCH * index as f64);
     }
@@ -45,7 +50,8 @@ fn draw_panel(picture: &mut Picture, document: &SensitivityDocument, curves: &[C
         let values: Vec<(f64, f64)> = curve.points.iter().map(|p| (p.size * scale, p.rmse_px)).collect();
         panel.line(picture, class, &values, f64::INFINITY);
         if let (Some((_, end)), false) = (values.last(), axis(curve).is_empty()) {
-            let place = (panel.left + panel.width - 4.0, panel.place_y(*end) - 4.0);
+            // Curves that end near each other must not have their names on top of each other.
+            let place = (panel.left + panel.width - 4.0 - 14.0 * index as f64, panel.place_y(*end) - 4.0);
             picture.text("name", place, Anchor::End, axis(curve));
         }
         // Where a diagnosis begins to find it.
