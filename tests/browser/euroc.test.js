@@ -14,6 +14,7 @@ import { browser, observation, scratch, Server, shared, vice, Window } from "./h
 const OFF_THE_FLOOR = { left: 600, right: 700, top: 225, bottom: 345 };
 /** The wall meets the floor above this row in the second frame. */
 const FLOOR_BEGINS = 255;
+const SLOW_MS = 300;
 
 const dataset = shared("data/euroc_v1_01");
 const skip = dataset === null;
@@ -35,6 +36,12 @@ test("four points on the floor, tracked, corrected and evaluated", { skip }, asy
   await window.press("e");
   await window.shows(1);
   await window.press("s");
+  // As from a slow disk: tracking that is asked for meanwhile waits for what is being written.
+  await page.route("**/api/edits*", async (route) => {
+    const response = await route.fetch();
+    await new Promise((resolve) => setTimeout(resolve, SLOW_MS));
+    await route.fulfill({ response });
+  }, { times: 1 });
   const all = page.getByRole("button", { name: "Use all 4" });
   await all.waitFor();
   await window.screenshot("euroc-2-suggested");

@@ -6,6 +6,7 @@ import { spawn, spawnSync } from "node:child_process";
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { basename, dirname, join, resolve } from "node:path";
+import { after } from "node:test";
 import { fileURLToPath } from "node:url";
 
 import { chromium } from "playwright-core";
@@ -19,6 +20,13 @@ const TARGET = resolve(ROOT, process.env.CARGO_TARGET_DIR ?? "target");
 export const SCREENSHOTS = join(TARGET, "browser-screenshots");
 const START_MS = 60_000;
 export const WAIT_MS = 30_000;
+
+/**
+ * Programs that were started. One that a failed test leaves behind would keep the test's own process waiting.
+ * @type {Set<ChildProcess>}
+ */
+const children = new Set();
+after(() => children.forEach((child) => child.kill("SIGKILL")));
 
 /** @returns {string} */
 function program() {
@@ -170,7 +178,7 @@ export class Server {
       child.on("exit", (code) => reject(new Error(`annotate ended with ${code}: ${said}`)));
     });
     const server = new Server(child, url);
-    process.on("exit", () => child.kill("SIGKILL"));
+    children.add(child);
     return server;
   }
 

@@ -278,17 +278,20 @@ export class Actions {
   }
 
   /**
-   * @param {string[]} names
+   * @param {string[] | null} names of the points, null for all
    * @param {Direction} direction
    */
   async track(names, direction) {
     if (!this.#mayWrite()) return;
     const { app } = this;
+    const { frame } = app;
     this.settle();
-    const here = names.filter((name) => app.labels.at(name, app.frame));
+    // Points that were placed just now are there once they are on the disk.
+    await app.session.written();
+    const here = (names ?? app.labels.names).filter((name) => app.labels.at(name, frame));
     if (here.length === 0) return this.tell("info", "Nothing to track from: the point is not labelled in this frame.");
     await app.session.stop(here);
-    await app.session.track(here, app.frame, direction, null);
+    await app.session.track(here, frame, direction, null);
   }
 
   async stop() {

@@ -58,7 +58,7 @@ export function commands(app, actions, player, help, targets, tell) {
     "track-forward": () => actions.track([app.selected], "forward"),
     "track-backward": () => actions.track([app.selected], "backward"),
     "track-both": () => actions.track([app.selected], "both"),
-    "track-all": () => actions.track(app.labels.names, "forward"),
+    "track-all": () => actions.track(null, "forward"),
     stop: () => actions.stop(),
     occluded: () => actions.toggleMark("occluded"),
     uncertain: () => actions.toggleMark("uncertain"),

@@ -101,6 +101,11 @@ export class Session {
     });
   }
 
+  /** @returns {Promise<unknown>} when all that was asked for so far is done */
+  written() {
+    return this.last;
+  }
+
   async reload() {
     this.labels.replace(await getState());
     this.listener.changed();
