@@ -195,16 +195,7 @@ export class Session {
    * @returns {Promise<boolean>} whether it has begun
    */
   track(points, frame, direction, until) {
-    return this.#write(async () => {
-      try {
-        const job = await postTrack(this.labels.state.revision, { points, frame, direction, until });
-        if (job.state === "running") this.labels.applyJob(job);
-        this.listener.changed();
-        return true;
-      } catch (error) {
-        return this.#refused(error);
-      }
-    });
+    return this.#begin(() => postTrack(this.labels.state.revision, { points, frame, direction, until }));
   }
 
   /**
@@ -212,9 +203,17 @@ export class Session {
    * @returns {Promise<boolean>} whether it has begun
    */
   detect(targets) {
+    return this.#begin(() => postDetect(this.labels.state.revision, targets));
+  }
+
+  /**
+   * @param {() => Promise<Job>} ask
+   * @returns {Promise<boolean>} whether it has begun
+   */
+  #begin(ask) {
     return this.#write(async () => {
       try {
-        const job = await postDetect(this.labels.state.revision, targets);
+        const job = await ask();
         if (job.state === "running") this.labels.applyJob(job);
         this.listener.changed();
         return true;

@@ -66,6 +66,12 @@ impl Verbosity {
     }
 }
 
+/// Moves a bar to where the work is; how much there is may only be known by then.
+pub(crate) fn advance(bar: &ProgressBar, done: usize, total: usize) {
+    bar.set_length(total as u64);
+    bar.set_position(done as u64);
+}
+
 /// Sends warnings of the libraries to standard error.
 pub(crate) fn show_warnings(verbosity: Verbosity) {
     let level = match (verbosity.quiet, verbosity.verbose) {

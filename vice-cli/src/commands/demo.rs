@@ -21,7 +21,7 @@ use crate::report::html::{IMAGE_BUDGET_BYTES, Run, Section, render};
 use crate::report::numbers::{first_and_last, mean};
 use crate::report::overlay::{Canvas, Colour, ESTIMATE_GREEN, ESTIMATE_YELLOW, LABEL_BLUE};
 use crate::report::table;
-use crate::terminal::{self, Outcome, Verbosity};
+use crate::terminal::{self, Outcome, Verbosity, advance};
 
 /// The estimates that are shown, the colours of their dots, and what is wrong with them.
 const ESTIMATES: [(&str, Colour); 3] =
@@ -46,8 +46,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     if let Some(out) = &args.out {
         let bar = verbosity.progress("rendering the flight");
         write_euroc(&flight, out, args.force, &|done, total| {
-            bar.set_length(total as u64);
-            bar.set_position(done as u64);
+            advance(&bar, done, total);
         })?;
         bar.finish_and_clear();
     }
@@ -156,8 +155,7 @@ fn diagnose_estimates(evaluation: &Evaluation<'_>, verbosity: Verbosity) -> anyh
             Diagnosis { evaluation, stream, depth: 0, inertial: None, flaws: &Flaw::ALL, options };
         let bar = verbosity.progress("diagnosing");
         let diagnosed = diagnose(&diagnosis, &|done, total| {
-            bar.set_length(total as u64);
-            bar.set_position(done as u64);
+            advance(&bar, done, total);
         })?;
         bar.finish_and_clear();
         let verdict = &diagnosed.document.verdict;

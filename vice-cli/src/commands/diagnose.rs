@@ -16,7 +16,7 @@ use vice_files::calibration::{CalibrationFile, CameraOverride};
 
 use crate::inputs::{EvaluationArgs, LoadedStreams, Outputs, Scoring, to_json};
 use crate::report::table;
-use crate::terminal::{self, Outcome, Verbosity, printable, usage};
+use crate::terminal::{self, Outcome, Verbosity, advance, printable, usage};
 
 /// Arguments of `vice diagnose`.
 #[derive(Debug, clap::Args)]
@@ -117,8 +117,7 @@ fn diagnose_all(
                 Diagnosis { evaluation, stream, depth, inertial, flaws: &flaws, options: looking.options() };
             let bar = verbosity.progress("fitting");
             let diagnosed = diagnose(&diagnosis, &|done, total| {
-                bar.set_length(total as u64);
-                bar.set_position(done as u64);
+                advance(&bar, done, total);
             });
             bar.finish_and_clear();
             let names =

@@ -11,7 +11,7 @@ use crate::inputs::{DatasetArgs, Outputs};
 use crate::report::frames::Shots;
 use crate::report::html::{IMAGE_BUDGET_BYTES, Run, render};
 use crate::report::result_file;
-use crate::terminal::{Outcome, Verbosity, printable};
+use crate::terminal::{Outcome, Verbosity, advance, printable};
 
 /// Arguments of `vice report`.
 #[derive(Debug, clap::Args)]
@@ -77,8 +77,7 @@ pub(crate) fn with_progress(
 ) -> Shots {
     let bar = verbosity.progress("reading images");
     let shots = Shots::of(document, dataset, budget_bytes, &|done, total| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
+        advance(&bar, done, total);
     });
     bar.finish_and_clear();
     shots

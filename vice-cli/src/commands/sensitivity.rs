@@ -8,7 +8,7 @@ use vice_core::result::Role;
 use super::diagnose::{LookingArgs, scoring};
 use crate::inputs::{EvaluationArgs, Outputs, to_json};
 use crate::report::{sensitivity_plot, table};
-use crate::terminal::{self, Outcome, Verbosity, printable, usage};
+use crate::terminal::{self, Outcome, Verbosity, advance, printable, usage};
 
 /// Arguments of `vice sensitivity`.
 #[derive(Debug, clap::Args)]
@@ -52,8 +52,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         let diagnosis = Diagnosis { evaluation, stream: *stream, depth: 0, inertial, flaws: &flaws, options };
         let bar = verbosity.progress("injecting");
         let document = sensitivity(&diagnosis, &|done, total| {
-            bar.set_length(total as u64);
-            bar.set_position(done as u64);
+            advance(&bar, done, total);
         })?;
         bar.finish_and_clear();
         Ok(document)

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use vice_synthetic::{Synthetic, SyntheticOptions, write_euroc};
 
 use crate::inputs::positive;
-use crate::terminal::{self, Outcome, Verbosity};
+use crate::terminal::{self, Outcome, Verbosity, advance};
 
 /// Arguments of `vice synth`.
 #[derive(Debug, clap::Args)]
@@ -38,8 +38,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     let flight = Synthetic::new(options)?;
     let bar = verbosity.progress("rendering");
     write_euroc(&flight, &args.out, args.force, &|done, total| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
+        advance(&bar, done, total);
     })?;
     bar.finish_and_clear();
     terminal::print(&format!("wrote {}\n", args.out.display()))?;

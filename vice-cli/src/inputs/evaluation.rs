@@ -13,7 +13,7 @@ use vice_core::metrics::align::Alignment;
 use vice_core::result::{ResultDocument, Settings};
 
 use super::{DatasetArgs, DepthArgs, LabelArgs, LoadedStreams, StreamArgs, load_streams, split_list};
-use crate::terminal::{Verbosity, usage};
+use crate::terminal::{Verbosity, advance, usage};
 
 /// Data set, labels, pose streams and depth.
 #[derive(Debug, clap::Args)]
@@ -52,8 +52,7 @@ impl EvaluationArgs {
         let document = self.with_evaluation_of(&dataset, scoring, |evaluation, _| {
             let bar = verbosity.progress("evaluating");
             let progress = |done, total| {
-                bar.set_length(total as u64);
-                bar.set_position(done as u64);
+                advance(&bar, done, total);
             };
             let document = match sink {
                 Some(sink) => evaluate_streaming(evaluation, &progress, sink)?,

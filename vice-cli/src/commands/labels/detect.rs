@@ -12,7 +12,7 @@ use vice_files::calibration::CalibrationFile;
 use vice_files::labels::{self, LabelFormat};
 
 use crate::inputs::{DatasetArgs, Outputs, positive, span_not_negative};
-use crate::terminal::{self, Outcome, Verbosity, printable, usage};
+use crate::terminal::{self, Outcome, Verbosity, advance, printable, usage};
 
 /// Arguments of `vice labels detect`.
 #[derive(Debug, clap::Args)]
@@ -128,8 +128,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     let bar = verbosity.progress("looking");
     let found =
         detect_labels(dataset.as_ref(), &used.name, &used.camera, &frames, &options, &|done, total| {
-            bar.set_length(total as u64);
-            bar.set_position(done as u64);
+            advance(&bar, done, total);
             ControlFlow::Continue(())
         })?;
     bar.finish_and_clear();
