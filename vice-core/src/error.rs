@@ -13,9 +13,27 @@ pub enum Place {
     Byte(u64),
 }
 
+/// What kind of thing is wrong, for callers that act on it: exit codes and exceptions follow from it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// A file, stream, camera or topic that is asked for is not there.
+    Missing,
+    /// Bytes or numbers that cannot be what they should be.
+    #[default]
+    Corrupt,
+    /// Well-formed data that VICE does not read.
+    Unsupported,
+    /// Two statements of the data, or of the data and the request, that exclude each other.
+    Contradictory,
+    /// A request that makes no sense, whatever the data.
+    Usage,
+}
+
 /// Data that cannot be used. Shown as one line: `path:line: problem (hint)`, then its cause.
 #[derive(Debug)]
 pub struct DataError {
+    kind: ErrorKind,
     path: Option<PathBuf>,
     place: Option<Place>,
     problem: String,
@@ -29,7 +47,24 @@ pub type DataResult<T> = Result<T, DataError>;
 impl DataError {
     /// An error that says what is wrong, in words a user understands.
     pub fn new(problem: impl Into<String>) -> Self {
-        Self { path: None, place: None, problem: problem.into(), hint: None, source: None }
+        Self {
+            kind: ErrorKind::default(),
+            path: None,
+            place: None,
+            problem: problem.into(),
+            hint: None,
+            source: None,
+        }
+    }
+
+    /// An error of a kind; [`DataError::new`] is [`ErrorKind::Corrupt`].
+    pub fn of_kind(kind: ErrorKind, problem: impl Into<String>) -> Self {
+        Self { kind, ..Self::new(problem) }
+    }
+
+    /// What kind of thing is wrong.
+    pub const fn kind(&self) -> ErrorKind {
+        self.kind
     }
 
     /// Adds the file or folder, unless one nearer to the cause is there already.

@@ -23,6 +23,7 @@ pub mod metrics;
 mod random;
 pub mod registry;
 pub mod result;
+pub mod suspicion;
 pub mod time;
 pub mod time_unit;
 pub mod track;

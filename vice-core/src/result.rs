@@ -9,6 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::camera::Pixel;
 use crate::metrics::pixel::SubsetRmse;
+use crate::suspicion::Suspicions;
 use crate::time::Stamp;
 
 /// The schema's name and version.
@@ -33,6 +34,9 @@ pub struct ResultDocument {
     /// Where each stream went, for plots; empty where the samples were not asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub paths: Vec<PathPart>,
+    /// What looks wrong in the data but did not stop the evaluation.
+    #[serde(default, skip_serializing_if = "Suspicions::is_empty")]
+    pub suspicions: Suspicions,
 }
 
 /// What was evaluated.

@@ -6,6 +6,7 @@ use vice_core::camera::Pixel;
 use vice_core::result::{
     DatasetPart, KeyframePart, PixelPart, PointName, ResultDocument, Role, SCHEMA, Sample, Settings, Skip,
 };
+use vice_core::suspicion::Suspicions;
 use vice_core::time::Stamp;
 
 /// A name that would run, close, colour or compute wherever it is not escaped.
@@ -65,6 +66,7 @@ pub(crate) fn document(pixel: Vec<PixelPart>) -> ResultDocument {
         pixel,
         trajectory: vec![],
         paths: vec![],
+        suspicions: Suspicions::new(),
     }
 }
 

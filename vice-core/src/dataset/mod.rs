@@ -20,6 +20,7 @@ use crate::camera::Camera;
 use crate::error::DataResult;
 use crate::frames::{BodyFromCamera, Cloud, Rigid, World};
 use crate::imu::{ImuSample, InertialState};
+use crate::suspicion::Suspicion;
 use crate::time::Stamp;
 use crate::trajectory::Trajectory;
 
@@ -129,6 +130,11 @@ pub trait Dataset: Send + Sync {
     /// [`DataError`](crate::error::DataError) if the floor depends on data that is missing at that stamp.
     fn floor(&self, _keyframe: Stamp) -> DataResult<Floor> {
         Ok(Floor::World(Plane::z_zero()))
+    }
+
+    /// What looked wrong when the data set was opened and read so far, each said once. Asked after the data was read.
+    fn suspicions(&self) -> Vec<Suspicion> {
+        Vec::new()
     }
 
     /// More that `vice info` should show, such as topics with their types and counts.

@@ -246,6 +246,7 @@ fn run(
         pixel,
         trajectory,
         paths,
+        suspicions: evaluation.dataset.suspicions().into_iter().collect(),
     })
 }
 
