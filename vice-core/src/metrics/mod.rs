@@ -2,7 +2,6 @@
 
 pub mod align;
 pub mod associate;
-pub mod paired;
 pub mod pixel;
 pub mod plane;
 pub mod rotation_offset;
