@@ -5,27 +5,25 @@
 //! that a relative path means the folder in which the request is run.
 
 mod command_line;
+mod depth_name;
 mod estimate;
-mod read;
 mod word;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use vice_core::error::ErrorKind;
 use vice_core::evaluate::{Observations, Window};
 use vice_core::metrics::align::Alignment;
 use vice_core::time::Span;
 use vice_detect::TagFamily;
 
+pub use depth_name::DepthName;
 pub use estimate::{Anchor, EstimateFrame, EstimateSpec, IMU_EULER, ReferenceSpec};
 
 pub(crate) use word::{seconds, seconds_option};
 
 use crate::error::{RunError, RunResult};
-use crate::open::Opened;
-use crate::sources::DepthName;
 
 /// Everything that says what is evaluated, and how.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -237,14 +235,6 @@ impl Request {
         }
     }
 
-    /// Reads a request, or that of a result document.
-    ///
-    /// # Errors
-    /// [`vice_core::error::DataError`] with the path and line if the file cannot be read or is neither.
-    pub fn read(path: impl AsRef<Path>) -> RunResult<Self> {
-        Ok(read::read(path.as_ref())?)
-    }
-
     /// The command line of `vice evaluate` that asks for the same.
     pub fn command_line(&self) -> String {
         command_line::of(self)
@@ -290,27 +280,6 @@ impl Protocol {
     /// The window of a run, for some labels.
     pub const fn window(&self, observations: Observations) -> Window {
         Window { fps: self.fps, start: self.start, duration: self.duration, observations }
-    }
-
-    /// Indices of the frames that are looked at, where nothing is scored.
-    ///
-    /// # Errors
-    /// [`RunError`] of the kind usage if there are none.
-    pub fn frames(&self, opened: &Opened) -> RunResult<Vec<usize>> {
-        self.check()?;
-        let frames = self.window(Observations::default()).frames(&opened.frames);
-        if frames.is_empty() {
-            return Err(RunError::new(
-                ErrorKind::Usage,
-                format!(
-                    "no frame lies in the part of the run that was asked for; camera {} has {}",
-                    opened.camera_name,
-                    opened.frames.len()
-                ),
-            )
-            .advise("see `start` and `duration`"));
-        }
-        Ok(frames)
     }
 
     /// Refuses negative times and rates.
