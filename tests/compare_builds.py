@@ -31,19 +31,20 @@ def commands(shared):
     yield "depth compare", ["depth", "compare", euroc, "--labels", labels / "floor.csv", "--source", "floor,zmap"]
     yield "diagnose", ["diagnose", euroc, "--labels", labels / "floor.csv", "--estimate", "imu-euler"]
     yield "sensitivity", ["sensitivity", euroc, "--labels", labels / "floor.csv", "--estimate", "ground-truth"]
-    for robot in ("locobot", "blackbird"):
-        for found in sorted((data / robot).rglob("*.csv")):
-            if "label" not in str(found.relative_to(data)):
-                continue
-            for run in sorted(p for p in (data / robot).iterdir() if p.is_dir() or p.suffix in (".bag", ".mcap", ".db3")):
-                for streams in (["--estimate", "odom"], ["--estimate", "imu-euler"], ["--estimate", "ground-truth"]):
-                    yield (f"{robot} {run.name} {found.name} {streams[1]}",
-                           ["evaluate", run, "--labels", found, *streams, "--depth", "floor", "--max-skipped", "100"])
-    trajectories = data / "euroc_trajectories"
-    for truth in sorted(trajectories.glob("*truth*")) + sorted(trajectories.glob("*/*truth*")):
-        for estimate in sorted(truth.parent.glob("*"))[:6]:
-            if estimate.is_file() and estimate != truth:
-                yield f"trajectory {estimate.name}", ["trajectory", truth, estimate, "--align", "se3"]
+    robot = data / "locobot"
+    for run in sorted(p for p in robot.iterdir() if p.is_dir() or p.suffix == ".bag"):
+        yield (f"locobot {run.name}", ["evaluate", run, "--labels", robot / "labels.csv", "--estimate", "odom,slam",
+                                       "--depth", "floor,zcam", "--max-skipped", "100"])
+    yield "locobot truth", ["evaluate", robot / "locobot_ros1.bag", "--labels", robot / "labels.csv", "--estimate", "odom",
+                            "--reference", robot / "truth_base_footprint.txt", "--depth", "zcam", "--max-skipped", "100"]
+    flight = data / "blackbird/picasso/yawForward/maxSpeed1p0"
+    yield "blackbird", ["evaluate", flight, "--labels", data / "blackbird/labels.csv", "--estimate",
+                        "imu-euler,ground-truth", "--depth", "floor,zcam", "--max-skipped", "100"]
+    for truth in sorted((data / "euroc_trajectories/truth").iterdir()):
+        flight = "_".join(truth.stem.split("_")[:2])
+        for estimate in sorted((data / "euroc_trajectories/estimates").glob(f"*{flight}*")):
+            for align in ("se3", "yaw"):
+                yield f"trajectory {estimate.name} {align}", ["trajectory", truth, estimate, "--align", align]
 
 
 def differences(a, b, where=""):
@@ -83,6 +84,7 @@ def main():
             (code_a, a), (code_b, b) = run(given.before, arguments, folder), run(given.after, arguments, folder)
             if a is None and b is None:
                 neither += 1
+                print(f"{name}: no document in either build (exit {code_a} and {code_b})")
                 continue
             found = list(differences(a, b)) if a is not None and b is not None else [f"exit {code_a} became {code_b}"]
             failed += bool(found)
