@@ -9,7 +9,7 @@ use vice_run::request::{LabelsSpec, Protocol, Request, Scoring};
 use super::{DatasetArgs, DepthArgs, StreamArgs, positive, span_not_negative, split_list};
 
 /// What a request in a file takes the place of.
-pub(crate) const ASKED: [&str; 28] = [
+pub(crate) const ASKED: [&str; 29] = [
     "path",
     "format",
     "settings",
@@ -25,6 +25,7 @@ pub(crate) const ASKED: [&str; 28] = [
     "estimate",
     "reference",
     "estimate_frame",
+    "estimate_as",
     "times",
     "time_offset",
     "max_gap",

@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use vice_core::conventions::Convention;
 use vice_core::evaluate::{Observations, Window};
 use vice_core::metrics::align::Alignment;
 use vice_core::time::Span;
@@ -139,6 +140,9 @@ pub struct StreamsSpec {
     /// Whose poses the estimates give.
     #[serde(default)]
     pub estimate_frame: EstimateFrame,
+    /// What the estimates are, where that is not what they are read as: mended before anything else.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub estimate_as: Vec<Convention>,
     /// Times of KITTI files; `None`: times.txt beside each.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub times: Option<PathBuf>,
@@ -175,6 +179,7 @@ impl Default for StreamsSpec {
             estimates: Vec::new(),
             reference: ReferenceSpec::default(),
             estimate_frame: EstimateFrame::default(),
+            estimate_as: Vec::new(),
             times: None,
             time_offset: None,
             max_gap: DEFAULT_MAX_GAP,
