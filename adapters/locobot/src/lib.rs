@@ -16,15 +16,23 @@
 #![forbid(unsafe_code)]
 
 mod calibration;
+mod camera;
 mod choose;
+mod clocks;
+mod complete;
 mod container;
 mod dataset;
+mod doubts;
 mod facts;
+mod image_size;
 mod imu;
 mod index;
+mod lenient;
 mod message;
+mod namespaces;
 mod open;
 mod pixels;
+mod series;
 mod settings;
 mod streams;
 #[cfg(test)]
@@ -32,6 +40,7 @@ mod testing;
 #[cfg(test)]
 mod tests;
 mod tf;
+mod to_and_fro;
 mod urdf;
 mod wire;
 

@@ -12,9 +12,7 @@ use rusqlite::{Connection, OpenFlags};
 use vice_core::error::{DataError, DataResult};
 use vice_core::time::Stamp;
 
-use super::{
-    Container, Encoding, HEAD_BYTES, Locator, MAX_MESSAGE_BYTES, Message, Payload, Scan, Visitor, Want,
-};
+use super::{Container, HEAD_BYTES, Locator, MAX_MESSAGE_BYTES, Message, Payload, Scan, Visitor, Want};
 
 /// What a data base starts with.
 pub(super) const MAGIC: &[u8] = b"SQLite format 3\0";
@@ -74,7 +72,7 @@ impl Db3 {
         let mut topics = BTreeMap::new();
         while let Some(row) = rows.next()? {
             let (name, kind, format): (String, String, String) = (row.get(1)?, row.get(2)?, row.get(3)?);
-            topics.insert(row.get(0)?, scan.topic(&name, &kind, Encoding::from_name(&format), visitor));
+            topics.insert(row.get(0)?, scan.topic(&name, &kind, &format, visitor));
         }
         Ok(topics)
     }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use vice_core::error::{DataError, DataResult};
+use vice_core::suspicion::Suspicion;
 
 use super::{db3, mcap, ros1};
 
@@ -44,12 +45,14 @@ pub(super) fn kind_of(path: &Path) -> DataResult<Kind> {
 }
 
 /// A recording.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Found {
     /// Its files in order.
     pub(crate) files: Vec<PathBuf>,
     /// Each message is compressed with zstd, as rosbag2 can do.
     pub(crate) compressed_messages: bool,
+    /// What is strange about the folder.
+    pub(crate) notes: Vec<Suspicion>,
 }
 
 #[derive(Deserialize)]
@@ -81,7 +84,7 @@ pub(crate) fn find(path: &Path) -> DataResult<Vec<Found>> {
         // That other files of it are missing is no reason not to read this one.
         let described = parent.and_then(|folder| described(folder).ok().flatten());
         let compressed_messages = described.is_some_and(|d| d.compressed_messages);
-        return Ok(vec![Found { files: vec![path.to_path_buf()], compressed_messages }]);
+        return Ok(vec![Found { files: vec![path.to_path_buf()], compressed_messages, notes: Vec::new() }]);
     }
     if let Some(found) = described(path)? {
         return Ok(vec![found]);
@@ -101,7 +104,7 @@ pub(crate) fn find(path: &Path) -> DataResult<Vec<Found>> {
         });
         match last {
             Some(last) => last.files.push(file),
-            None => found.push(Found { files: vec![file], compressed_messages: false }),
+            None => found.push(Found { files: vec![file], ..Found::default() }),
         }
     }
     for folder in entries(path).into_iter().filter(|p| p.is_dir()) {
@@ -171,5 +174,5 @@ fn described(folder: &Path) -> DataResult<Option<Found>> {
     if files.is_empty() {
         return Ok(None);
     }
-    Ok(Some(Found { files, compressed_messages: mode == "message" }))
+    Ok(Some(Found { files, compressed_messages: mode == "message", notes: Vec::new() }))
 }

@@ -9,9 +9,7 @@ use vice_core::error::{DataError, DataResult};
 use vice_core::time::Stamp;
 
 use super::block::{Block, BlockFile, Compression, Records, Source, State};
-use super::{
-    Container, Encoding, HEAD_BYTES, Locator, MAX_MESSAGE_BYTES, Message, Payload, Scan, Visitor, Want,
-};
+use super::{Container, HEAD_BYTES, Locator, MAX_MESSAGE_BYTES, Message, Payload, Scan, Visitor, Want};
 
 /// What an MCAP file starts and ends with.
 pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
@@ -217,8 +215,7 @@ fn describe(
         }
         Ok(Record::Channel(channel)) => {
             let kind = state.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
-            let encoding = Encoding::from_name(&channel.message_encoding);
-            let topic = scan.topic(&channel.topic, &kind, encoding, visitor);
+            let topic = scan.topic(&channel.topic, &kind, &channel.message_encoding, visitor);
             state.topics.insert(u32::from(channel.id), topic);
         }
         Ok(_) => {}

@@ -54,6 +54,8 @@ pub(crate) struct Topic {
     pub(crate) kind: String,
     /// How they are serialised.
     pub(crate) encoding: Encoding,
+    /// The name that the recording has for that, such as `cdr` or `json`.
+    pub(crate) format: String,
     /// How many there are.
     pub(crate) count: u64,
     /// Record times of the earliest and the latest.
@@ -61,6 +63,11 @@ pub(crate) struct Topic {
 }
 
 impl Topic {
+    /// Whether it has messages, in an encoding that is read.
+    pub(crate) fn is_read(&self) -> bool {
+        self.count > 0 && self.encoding != Encoding::Other
+    }
+
     fn note(&mut self, recorded: Stamp, count: u64) {
         self.count += count;
         let (first, last) = self.recorded.unwrap_or((recorded, recorded));
@@ -108,7 +115,7 @@ pub(crate) struct Message<'a> {
 
 /// Sees the messages of a recording in the order in which they were written.
 pub(crate) trait Visitor {
-    /// Asked once a topic, before its first message.
+    /// Asked once a topic that can be read, before its first message.
     fn want(&mut self, topic: usize, info: &Topic) -> Want;
     /// A message of a topic that is wanted.
     fn message(&mut self, message: &Message<'_>);
@@ -121,20 +128,22 @@ pub(crate) struct Scan {
     pub(crate) topics: Vec<Topic>,
     /// Damage that was passed over, one line each with the byte.
     pub(crate) damage: Vec<String>,
-    by_name: HashMap<(String, String), usize>,
+    by_name: HashMap<(String, String, String), usize>,
     wants: Vec<Want>,
 }
 
 impl Scan {
     /// The index of a topic; `kind` may be in the long form of ROS 2, `nav_msgs/msg/Odometry`.
-    fn topic(&mut self, name: &str, kind: &str, encoding: Encoding, visitor: &mut dyn Visitor) -> usize {
+    fn topic(&mut self, name: &str, kind: &str, format: &str, visitor: &mut dyn Visitor) -> usize {
         let kind = kind.replace("/msg/", "/");
-        let key = (name.to_string(), kind);
+        let key = (name.to_string(), kind, format.to_string());
         if let Some(&topic) = self.by_name.get(&key) {
             return topic;
         }
         let topic = self.topics.len();
-        let info = Topic { name: key.0.clone(), kind: key.1.clone(), encoding, count: 0, recorded: None };
+        let encoding = Encoding::from_name(format);
+        let (name, kind, format) = key.clone();
+        let info = Topic { name, kind, encoding, format, count: 0, recorded: None };
         let readable = encoding != Encoding::Other;
         self.wants.push(if readable { visitor.want(topic, &info) } else { Want::Nothing });
         self.topics.push(info);

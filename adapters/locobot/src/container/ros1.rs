@@ -140,7 +140,7 @@ impl Records for BagRecords {
                 OP_CONNECTION => {
                     let header = source.get(record.data_at, record.data_len as usize)?.unwrap_or_default();
                     let kind = fields(header).find(|f| f.0 == b"type").map(|f| text(f.1)).unwrap_or_default();
-                    let topic = scan.topic(&record.text, &kind, Encoding::Ros1, visitor);
+                    let topic = scan.topic(&record.text, &kind, "ros1", visitor);
                     state.topics.insert(conn, topic);
                 }
                 OP_MESSAGE => {
