@@ -1,10 +1,11 @@
 //! `vice info`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::fmt::Write;
 use std::path::Path;
 
 use vice_core::dataset::{Dataset, Floor, Probe};
+use vice_core::suspicion::Suspicion;
 use vice_core::time::{Span, Stamp};
 
 use crate::formats;
@@ -49,14 +50,20 @@ fn describe(dataset: &dyn Dataset, camera: Option<&str>) -> anyhow::Result<Strin
     writeln!(text, "{} ({})", printable(dataset.name()), printable(dataset.format()))?;
     writeln!(text, "cameras")?;
     let mut first_frame = None;
-    for name in dataset.cameras().iter().filter(|n| camera.is_none_or(|c| c == n.as_str())) {
+    // A camera that is asked for may be one of several that none of is listed.
+    let cameras = camera.map_or_else(|| dataset.cameras(), |name| vec![name.to_string()]);
+    for name in &cameras {
         first_frame = first_frame.or(describe_camera(&mut text, dataset, name)?);
     }
     describe_streams(&mut text, dataset)?;
-    let imu = dataset.imu()?;
-    if let (Some(first), Some(last)) = (imu.first(), imu.last()) {
-        writeln!(text, "imu")?;
-        writeln!(text, "  {}", stretch(imu.len(), first.stamp, last.stamp))?;
+    match dataset.imu() {
+        Ok(imu) => {
+            if let (Some(first), Some(last)) = (imu.first(), imu.last()) {
+                writeln!(text, "imu")?;
+                writeln!(text, "  {}", stretch(imu.len(), first.stamp, last.stamp))?;
+            }
+        }
+        Err(error) => writeln!(text, "imu\n  cannot be read: {}", printable(&error.to_string()))?,
     }
     if let Some(cloud) = dataset.cloud()? {
         writeln!(text, "point cloud")?;
@@ -76,7 +83,9 @@ fn describe(dataset: &dyn Dataset, camera: Option<&str>) -> anyhow::Result<Strin
         writeln!(text, "  {:.4} x + {:.4} y + {:.4} z + {d:.4} m = 0 in the {frame}", n.x, n.y, n.z)?;
     }
     let mut sections: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    let mut known: HashSet<String> = HashSet::new();
     for fact in dataset.facts() {
+        known.insert(fact.text.clone());
         sections.entry(fact.section).or_default().push(fact.text);
     }
     for (section, lines) in sections {
@@ -84,6 +93,15 @@ fn describe(dataset: &dyn Dataset, camera: Option<&str>) -> anyhow::Result<Strin
         for line in lines {
             writeln!(text, "  {}", printable(&line))?;
         }
+    }
+    // What stands among the facts already is not said twice.
+    let said: Vec<String> = dataset.suspicions().iter().map(Suspicion::line).collect();
+    let mut new = said.iter().filter(|line| !known.contains(*line)).peekable();
+    if new.peek().is_some() {
+        writeln!(text, "suspicions")?;
+    }
+    for line in new {
+        writeln!(text, "  {}", printable(line))?;
     }
     Ok(text)
 }

@@ -58,13 +58,22 @@ impl DatasetArgs {
         let names = dataset.cameras();
         match &self.camera {
             Some(name) if names.contains(name) => Ok(name.clone()),
+            // Where several cameras could be meant none is listed, and each is there by its name.
+            Some(name) if names.is_empty() && dataset.frames(name).is_ok() => Ok(name.clone()),
+            Some(_) if names.is_empty() => Err(self.no_camera(dataset)),
             Some(name) => {
                 Err(usage(format!("--camera: there is no camera {name}; there are {}", names.join(", "))))
             }
-            None => names
-                .into_iter()
-                .next()
-                .ok_or_else(|| anyhow::anyhow!("{}: the data set has no camera", self.path.display())),
+            None => names.into_iter().next().ok_or_else(|| self.no_camera(dataset)),
+        }
+    }
+
+    /// Why there is no camera: the data set may know.
+    fn no_camera(&self, dataset: &dyn Dataset) -> anyhow::Error {
+        let path = self.path.display();
+        match dataset.suspicions().into_iter().find(|s| s.code == "no-camera") {
+            Some(reason) => anyhow::anyhow!("{path}: {}", reason.line()),
+            None => anyhow::anyhow!("{path}: the data set has no camera"),
         }
     }
 

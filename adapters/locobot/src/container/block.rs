@@ -202,9 +202,10 @@ pub(super) struct BlockFile {
 }
 
 impl BlockFile {
-    pub(super) fn open(path: &Path) -> DataResult<Arc<Self>> {
+    /// Opens the file at `place`; `path` is the one that the user knows.
+    pub(super) fn open(path: &Path, place: &Path) -> DataResult<Arc<Self>> {
         let failed = |e: std::io::Error| DataError::new("cannot be read").at(path).because(e);
-        let file = File::open(path).map_err(failed)?;
+        let file = File::open(place).map_err(failed)?;
         let len = file.metadata().map_err(failed)?.len();
         Ok(Arc::new(Self { file: Mutex::new(file), len, cache: Mutex::default(), spare: Mutex::default() }))
     }

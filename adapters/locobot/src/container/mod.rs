@@ -9,6 +9,7 @@ mod db3;
 mod find;
 mod mcap;
 mod ros1;
+mod unpack;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -183,22 +184,54 @@ trait Container: Send + Sync {
 /// A recording of one or several files, read as one.
 pub(crate) struct Recording {
     files: Vec<(PathBuf, Box<dyn Container>)>,
+    /// Files that had to be copied to be read, until the recording is closed.
+    _copies: Vec<unpack::Copy>,
+    /// What was damaged already when the files were opened.
+    damage: Vec<String>,
 }
 
 impl Recording {
     /// Opens what [`find`] found.
     pub(crate) fn open(found: &Found) -> DataResult<Self> {
         let mut files: Vec<(PathBuf, Box<dyn Container>)> = Vec::new();
+        let (mut copies, mut damage) = (Vec::new(), Vec::new());
         for path in &found.files {
-            let kind = find::kind_of(path).map_err(|e| e.at(path))?;
+            let (kind, packed) = find::kind_of(path).map_err(|e| e.at(path))?;
+            let mut copy = if packed { Some(unpack::unpack(path)?) } else { None };
+            if kind == find::Kind::Sqlite && !packed && unpack::has_log(path) {
+                let log = unpack::log_of(path);
+                match unpack::with_log(path) {
+                    Ok(merged) => {
+                        copy = Some(merged);
+                        let problem =
+                            "the recorder was not stopped properly: what is here is read with the data base";
+                        damage.push(DataError::new(problem).at(log).to_string());
+                    }
+                    Err(e) => damage.push(
+                        DataError::new(format!(
+                            "what sqlite had not merged into the data base is not read: {e}"
+                        ))
+                        .at(&log)
+                        .hint("open a copy once with sqlite3 to merge it")
+                        .to_string(),
+                    ),
+                }
+            }
+            let problem = copy.as_ref().and_then(|copy| copy.damage.as_deref());
+            damage.extend(problem.map(|problem| DataError::new(problem).at(path).to_string()));
+            // What is said is said of the file that the user has.
+            let place = copy.as_ref().map_or(path.as_path(), |copy| copy.path.as_path());
             let container: Box<dyn Container> = match kind {
-                find::Kind::Ros1 => Box::new(ros1::open(path)?),
-                find::Kind::Mcap => Box::new(mcap::open(path)?),
-                find::Kind::Sqlite => Box::new(db3::Db3::open(path, found.compressed_messages)?),
+                find::Kind::Ros1 => Box::new(ros1::open(path, place)?),
+                find::Kind::Mcap => Box::new(mcap::open(path, place)?),
+                find::Kind::Sqlite => {
+                    Box::new(db3::Db3::open(path, place, found.compressed_messages, copy.is_some())?)
+                }
             };
             files.push((path.clone(), container));
+            copies.extend(copy);
         }
-        Ok(Self { files })
+        Ok(Self { files, _copies: copies, damage })
     }
 
     /// Walks all files.
@@ -208,7 +241,7 @@ impl Recording {
     /// # Errors
     /// [`DataError`] if a file cannot be read at all.
     pub(crate) fn scan(&self, visitor: &mut dyn Visitor) -> DataResult<Scan> {
-        let mut scan = Scan::default();
+        let mut scan = Scan { damage: self.damage.clone(), ..Scan::default() };
         for (file, (path, container)) in (0_u32..).zip(&self.files) {
             container.scan(file, &mut scan, visitor).map_err(|e| e.at(path))?;
         }

@@ -33,9 +33,9 @@ pub(super) struct Ros1 {
     damage: Vec<DataError>,
 }
 
-/// Finds the chunks of a bag.
-pub(super) fn open(path: &Path) -> DataResult<Ros1> {
-    let file = BlockFile::open(path)?;
+/// Finds the chunks of a bag, which lies at `place` where it had to be unpacked.
+pub(super) fn open(path: &Path, place: &Path) -> DataResult<Ros1> {
+    let file = BlockFile::open(path, place)?;
     let mut source = file.window();
     let version = source.get(0, VERSION.len())?.unwrap_or_default();
     if version != VERSION {
