@@ -102,11 +102,8 @@ impl RosDataset {
 
     /// `body_from_frame` of a frame of tf.
     fn base(&self) -> DataResult<&str> {
+        self.tf.decided().map_err(|e| e.at(&self.path))?;
         self.frames.base.as_deref().ok_or_else(|| {
-            if let Some(why) = &self.tf.undecided {
-                let error = DataError::of_kind(ErrorKind::Contradictory, why.clone());
-                return error.at(&self.path).hint("set tf_namespace");
-            }
             DataError::new("the frame of the body is not known: tf has neither base_footprint nor base_link")
                 .at(&self.path)
                 .hint(format!("set base_frame; frames of tf: {}", list(&self.tf.frames())))

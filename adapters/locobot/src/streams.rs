@@ -51,6 +51,7 @@ impl GroundTruth {
 
 /// The way of a stream of tf: from the base to the world frame.
 pub(crate) fn tf_chain<'a>(tf: &'a TfTree, frames: &'a Frames, stream: &str) -> DataResult<Chain<'a>> {
+    tf.decided()?;
     let (key, world) = if stream == ODOM { ("odom_frame", &frames.odom) } else { ("map_frame", &frames.map) };
     let (Some(world), Some(base)) = (world, &frames.base) else {
         let (key, missing) = if world.is_none() { (key, "world frame") } else { ("base_frame", "base") };

@@ -122,15 +122,21 @@ impl TfTree {
         DataError::new(format!("tf has a cycle: {shown}"))
     }
 
+    /// Refuses where tf comes from several robots and nothing says which is meant.
+    pub(crate) fn decided(&self) -> DataResult<()> {
+        let error = |why: &String| {
+            DataError::of_kind(ErrorKind::Contradictory, why.as_str()).hint("set tf_namespace")
+        };
+        self.undecided.as_ref().map_or(Ok(()), |why| Err(error(why)))
+    }
+
     /// The way from `source` to `target`.
     ///
     /// # Errors
     /// [`DataError`] that names the frames of a cycle, the frame that tf does not know, or the two roots that are not
     /// connected.
     pub(crate) fn chain<'a>(&'a self, target: &'a str, source: &'a str) -> DataResult<Chain<'a>> {
-        if let Some(why) = &self.undecided {
-            return Err(DataError::of_kind(ErrorKind::Contradictory, why.clone()).hint("set tf_namespace"));
-        }
+        self.decided()?;
         let (mut to_target, target_root) = self.ancestors(target)?;
         let (mut to_source, source_root) = self.ancestors(source)?;
         if target_root != source_root {

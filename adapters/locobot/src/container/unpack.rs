@@ -83,7 +83,9 @@ pub(super) fn unpack(path: &Path) -> DataResult<Copy> {
             Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
             Err(e) if done == 0 => return Err(failed(e)),
             Err(e) => {
-                break Some(format!("the compressed file is damaged or cut off: read as far as it goes: {e}"));
+                break Some(format!(
+                    "the compressed file is damaged or cut off: read as far as it goes: {e}"
+                ));
             }
         }
     };
