@@ -10,7 +10,7 @@ use crate::doubts::TWO_SOURCES;
 use crate::tf::Transform;
 
 /// Steps below these are no jumps, whatever comes after: metres and radians.
-const SMALLEST_JUMP: (f64, f64) = (0.05, 0.05);
+const SMALLEST_JUMP: (f64, f64) = (0.02, 0.02);
 /// A series that jumps has jumped back where it is nearer to its old place than this part of the jump.
 const BACK: f64 = 0.25;
 /// Jumps that come back, below which a series is only restless.
@@ -79,7 +79,7 @@ mod tests {
     use vice_core::frames::Rigid;
 
     fn of(xs: &[f64]) -> Option<ToAndFro> {
-        find(xs.len(), 0.05, |a, b| (xs[a] - xs[b]).abs())
+        find(xs.len(), 0.02, |a, b| (xs[a] - xs[b]).abs())
     }
 
     /// `rhythm` says whose turn it is, over and over; the sources drive `step` a sample and are `apart`.
@@ -93,7 +93,7 @@ mod tests {
         for rhythm in
             [&[0, 1][..], &[0, 0, 1, 1], &[0, 0, 0, 0, 0, 1], &[0, 0, 0, 0, 1, 1, 1, 1, 1], &[1, 0, 1]]
         {
-            for (step, apart) in [(0.0, 0.2), (0.005, 1.0), (0.005, 100.0)] {
+            for (step, apart) in [(0.0, 0.03), (0.0, 0.2), (0.005, 1.0), (0.005, 100.0)] {
                 let found = of(&two(rhythm, 60, step, apart)).unwrap();
                 assert!((found.middle - apart).abs() < 0.1 * apart, "{rhythm:?} {step} {apart}: {found:?}");
             }

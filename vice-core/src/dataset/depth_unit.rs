@@ -22,25 +22,23 @@ pub fn depth_unit_doubt(image: &DepthImage) -> Option<Suspicion> {
     let middle = depths.len() / 2;
     let (_, z_m, _) = depths.select_nth_unstable_by(middle, f32::total_cmp);
     let z_m = f64::from(*z_m);
-    let question = match z_m {
+    let perhaps = match z_m {
         z if z > TOO_FAR_M => {
             let units = [("millimetres", z / 1000.0), ("centimetres", z / 100.0)];
             let fitting = units.iter().filter(|(_, z)| (TOO_NEAR_M..TOO_FAR_M).contains(z));
             let each: Vec<String> = fitting.map(|(unit, z)| format!("{unit} ({z:.3} m)")).collect();
             match each.is_empty() {
-                true => "are the numbers something else than metres".to_string(),
-                false => format!("are the numbers {}", each.join(" or ")),
+                true => String::new(),
+                false => format!(", perhaps they are in {}", each.join(" or ")),
             }
         }
-        z if z < TOO_NEAR_M => {
-            "are the numbers metres or centimetres that were read as millimetres".to_string()
-        }
+        z if z < TOO_NEAR_M => ", perhaps metres or centimetres were read as millimetres".to_string(),
         _ => return None,
     };
-    let message = format!("the depth images cannot be in metres: {question}?");
+    let digits = if z_m >= 1.0 { 0 } else { 4 };
     Some(
-        Suspicion::new("depth-unit", "", message)
-            .evidence(format!("their median depth would be {z_m:.6} m"))
+        Suspicion::new("depth-unit", "", format!("the depth images cannot be in metres{perhaps}"))
+            .evidence(format!("their median depth would be {z_m:.digits$} m"))
             .advice(
                 "recordings take `--set depth_unit=mm`, cm, m or metres a count; else convert the images",
             ),
@@ -63,8 +61,10 @@ mod tests {
     fn what_no_depth_camera_sees_is_doubted() {
         assert!(doubt(1061.0).unwrap().contains("millimetres (1.061 m) or centimetres (10.610 m)"));
         assert!(doubt(150.0).unwrap().contains("millimetres (0.150 m) or centimetres (1.500 m)"));
-        assert!(doubt(9000.0).unwrap().contains("millimetres (9.000 m)?"));
-        assert!(doubt(1e9).unwrap().contains("something else"));
+        assert!(doubt(9000.0).unwrap().contains("in millimetres (9.000 m): "));
+        assert!(
+            doubt(1e9).unwrap().contains("cannot be in metres: their median depth would be 1000000000 m")
+        );
         assert!(doubt(0.002).unwrap().contains("read as millimetres"));
         for z in [0.05, 0.3, 1.0, 10.0, 60.0, f32::NAN] {
             assert_eq!(doubt(z), None, "{z}");
