@@ -217,13 +217,13 @@ impl Frames {
             })
         };
         let base = set("base_frame")?
-            .or_else(|| tf.find("base_footprint"))
-            .or_else(|| tf.find("base_link"))
+            .or_else(|| tf.find_near("base_footprint", camera))
+            .or_else(|| tf.find_near("base_link", camera))
             .or_else(|| child.filter(|c| !c.is_empty()).map(str::to_string));
         Ok(Self {
-            odom: set("odom_frame")?.or_else(|| tf.find("odom")),
-            map: set("map_frame")?.or_else(|| tf.find("map")),
-            floor: set("floor_frame")?.or_else(|| tf.find("base_footprint")),
+            odom: set("odom_frame")?.or_else(|| tf.find_near("odom", camera)),
+            map: set("map_frame")?.or_else(|| tf.find_near("map", camera)),
+            floor: set("floor_frame")?.or_else(|| tf.find_near("base_footprint", camera)),
             camera: set("camera_frame")?.or_else(|| camera.filter(|c| !c.is_empty()).map(str::to_string)),
             base,
         })

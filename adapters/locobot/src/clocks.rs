@@ -14,15 +14,17 @@ use crate::index::Index;
 /// A difference that no transport or filter makes.
 const TOO_MUCH: Span = Span::from_millis(1000);
 
-/// Topics whose least delay differs from that of the camera.
+/// Topics that are recorded all the time much later or earlier after their stamps than the camera: a transform that is
+/// dated ahead now and then, or a pose that was held back, says nothing of clocks.
 pub(crate) fn doubt(topics: &[Topic], chosen: &Topics, index: &Index) -> Option<Suspicion> {
     let camera = chosen.color.or(chosen.cameras.first().copied())?;
-    let own = index.delays.of(camera)?;
+    let (least, most) = index.delays.of(camera)?;
+    let is_apart = |(low, high): (Span, Span)| low - most > TOO_MUCH || least - high > TOO_MUCH;
     let seconds = |span: Span| span.as_secs_f64();
     let off: Vec<String> = (0..topics.len())
         .filter_map(|topic| Some((topic, index.delays.of(topic)?)))
-        .filter(|(topic, delay)| !index.images.contains_key(topic) && Span::abs(*delay - own) > TOO_MUCH)
-        .map(|(topic, delay)| format!("{} {:.3} s", topics[topic].name, seconds(delay)))
+        .filter(|(topic, delay)| !index.images.contains_key(topic) && is_apart(*delay))
+        .map(|(topic, delay)| format!("{} {:.3} s", topics[topic].name, seconds(delay.0)))
         .collect();
     if off.is_empty() {
         return None;
@@ -32,7 +34,7 @@ pub(crate) fn doubt(topics: &[Topic], chosen: &Topics, index: &Index) -> Option<
         Suspicion::new("clocks-differ", format!("topic {}", topics[camera].name), message)
             .evidence(format!(
                 "recorded {:.3} s after their stamps, of {}",
-                seconds(own),
+                seconds(least),
                 crate::tf::list(&off)
             ))
             .advice("--time-offset shifts the estimates; `--set stamps=record` takes the time of recording"),

@@ -104,7 +104,13 @@ impl RosDataset {
     fn base(&self) -> DataResult<&str> {
         self.tf.decided().map_err(|e| e.at(&self.path))?;
         self.frames.base.as_deref().ok_or_else(|| {
-            DataError::new("the frame of the body is not known: tf has neither base_footprint nor base_link")
+            let several =
+                [self.tf.behind_prefixes("base_footprint"), self.tf.behind_prefixes("base_link")].concat();
+            let why = match several.len() {
+                0 | 1 => "tf has neither base_footprint nor base_link".to_string(),
+                _ => format!("it could be {}", list(&several)),
+            };
+            DataError::of_kind(ErrorKind::Missing, format!("the frame of the body is not known: {why}"))
                 .at(&self.path)
                 .hint(format!("set base_frame; frames of tf: {}", list(&self.tf.frames())))
         })

@@ -1,10 +1,11 @@
 //! Opening a recording: the index pass, what tf lacks, and the choice of topics and frames.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::OnceLock;
 
 use vice_core::dataset::OpenOptions;
-use vice_core::error::{DataError, DataResult};
+use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::suspicion::Suspicion;
 use vice_core::time::Span;
 
@@ -12,14 +13,17 @@ use crate::camera::{Images, RosCamera, way_out};
 use crate::choose::{Frames, Topics, camera_name, info_beside};
 use crate::container::{Encoding, Recording, Topic, find};
 use crate::dataset::RosDataset;
-use crate::doubts::{DAMAGED, Doubts, NO_CAMERA, SEVERAL_TOPICS, group};
+use crate::doubts::{DAMAGED, Doubts, NO_CAMERA, SEVERAL_TOPICS, TWO_SOURCES, group};
 use crate::index::Index;
 use crate::namespaces::{self, Asked};
+use crate::series::PoseTopic;
 use crate::settings::Settings;
 use crate::streams::GroundTruth;
 use crate::tf::{TfTree, list};
 use crate::{clocks, complete};
 
+/// Places of damage that are named one by one.
+const SHOWN_PLACES: usize = 5;
 /// How far a depth image may be from a frame where the period of the frames is not known.
 const LONE_FRAME_OFFSET: Span = Span::from_millis(20);
 
@@ -46,7 +50,7 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> DataResult<RosDataset>
     let recording = Recording::open(&found)?;
     let mut index = Index::new(settings.stamps()?);
     let scan = recording.scan(&mut index)?;
-    doubts.say_all(scan.damage.into_iter().map(|line| Suspicion::new(DAMAGED, "", line)));
+    doubts.say_all(damage(scan.damage));
     doubts.say_all(index.broken(&recording, &scan.topics));
     let topics = scan.topics;
     doubts.say_all(unread(&topics));
@@ -67,7 +71,16 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> DataResult<RosDataset>
     };
     let mut cameras = Vec::new();
     for topic in chosen.color.into_iter().chain(chosen.cameras.iter().copied()) {
-        let Some(images) = images(topic)? else { continue };
+        let images = match images(topic) {
+            Ok(Some(images)) => images,
+            Ok(None) => continue,
+            Err(e) if chosen.color.is_some() => return Err(e),
+            // One of several that nobody has asked for yet.
+            Err(e) => {
+                doubts.say(Suspicion::new(DAMAGED, "", e.to_string()));
+                continue;
+            }
+        };
         let info = match chosen.color {
             Some(_) => chosen.info,
             None => chosen.info.filter(|_| settings.get("camera_info_topic").is_some()).or_else(|| {
@@ -100,8 +113,16 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> DataResult<RosDataset>
         let message = format!("its frame is {}, the camera's is {camera}: is it registered?", depth.frame);
         doubts.say(Suspicion::new("depth-frame", format!("topic {}", depth.topic), message));
     }
-    let poses: std::collections::BTreeMap<_, _> =
-        index.poses.into_iter().map(|(topic, poses)| (topics[topic].name.clone(), poses)).collect();
+    let mut poses: BTreeMap<String, PoseTopic> = BTreeMap::new();
+    for (topic, found) in index.poses {
+        let Topic { name, kind, .. } = &topics[topic];
+        if poses.contains_key(name) {
+            let message = format!("there are messages of several types: those of {kind} are left out");
+            doubts.say(Suspicion::new(TWO_SOURCES, format!("topic {name}"), message));
+        } else {
+            poses.insert(name.clone(), found);
+        }
+    }
     poses.iter().for_each(|(name, topic)| doubts.say_all(topic.doubts(name)));
     let names: Vec<&str> = poses.keys().map(String::as_str).collect();
     let ground_truth = GroundTruth::choose(&settings, &names)?;
@@ -124,6 +145,17 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> DataResult<RosDataset>
         doubts,
         imu: OnceLock::new(),
     })
+}
+
+/// Damage of the files: the first places, and how many more there are.
+fn damage(mut places: Vec<String>) -> Vec<Suspicion> {
+    let more = if places.len() > SHOWN_PLACES + 1 { places.split_off(SHOWN_PLACES).len() } else { 0 };
+    let said = places.into_iter().map(|line| Suspicion::new(DAMAGED, "", line));
+    let rest = (more > 0).then(|| {
+        let message = format!("{more} more places of the recording are damaged in the same way or another");
+        Suspicion::new(DAMAGED, "", message).times(more as u64)
+    });
+    said.chain(rest).collect()
 }
 
 /// The tree of the robot that is meant, completed by what its description has.
@@ -213,13 +245,21 @@ fn check_use(topics: &[Topic], path: &Path, doubts: &Doubts) -> DataResult<()> {
         return Ok(());
     }
     let names: Vec<String> = topics.iter().map(|t| format!("{} ({})", t.name, t.kind)).collect();
-    let problem = match topics.is_empty() {
-        true => "there are no messages".to_string(),
-        false => "no topic has images, transforms or poses".to_string(),
+    let mut unread: Vec<&str> =
+        topics.iter().filter(|t| t.encoding == Encoding::Other).map(|t| t.format.as_str()).collect();
+    unread.sort_unstable();
+    unread.dedup();
+    let problem = match (topics.is_empty(), unread.as_slice()) {
+        (true, _) => "there are no messages".to_string(),
+        (false, []) => "no topic has images, transforms or poses".to_string(),
+        (false, formats) => format!(
+            "no topic has images, transforms or poses that can be read: messages in {} are not",
+            list(formats)
+        ),
     };
-    let error = DataError::new(problem).at(path);
-    Err(match doubts.all().first() {
-        Some(first) => error.because(DataError::new(first.line())),
+    let error = DataError::of_kind(ErrorKind::Unsupported, problem).at(path);
+    Err(match doubts.damage().into_iter().next() {
+        Some(first) => error.because(DataError::new(first)),
         None if names.is_empty() => error,
         None => error.hint(format!("its topics: {}", list(&names))),
     })

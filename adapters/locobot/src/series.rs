@@ -188,22 +188,22 @@ impl InfoTopic {
     }
 }
 
-/// How long after their stamps the messages of a topic were recorded, at the least.
+/// How long after their stamps the messages of a topic were recorded: the least and the most.
 #[derive(Debug, Default)]
-pub(crate) struct Delays(BTreeMap<usize, Span>);
+pub(crate) struct Delays(BTreeMap<usize, (Span, Span)>);
 
 impl Delays {
     /// Adds a message of a topic.
     pub(crate) fn add(&mut self, topic: usize, stamp: Stamp, recorded: Stamp) {
         if stamp.as_nanos() != 0 && recorded.as_nanos() != 0 {
             let delay = recorded.since(stamp);
-            let least = self.0.entry(topic).or_insert(delay);
-            *least = (*least).min(delay);
+            let (least, most) = self.0.entry(topic).or_insert((delay, delay));
+            (*least, *most) = ((*least).min(delay), (*most).max(delay));
         }
     }
 
-    /// The least delay of a topic.
-    pub(crate) fn of(&self, topic: usize) -> Option<Span> {
+    /// The least and the most of a topic.
+    pub(crate) fn of(&self, topic: usize) -> Option<(Span, Span)> {
         self.0.get(&topic).copied()
     }
 }

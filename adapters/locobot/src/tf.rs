@@ -86,6 +86,27 @@ impl TfTree {
         }
     }
 
+    /// All frames of a name behind a prefix.
+    pub(crate) fn behind_prefixes(&self, name: &str) -> Vec<&str> {
+        let behind = format!("/{name}");
+        self.frames().into_iter().filter(|frame| frame.ends_with(&behind)).collect()
+    }
+
+    /// As [`TfTree::find`]; where several prefixes fit, the one that is `near`'s too, as of one robot of many.
+    pub(crate) fn find_near(&self, name: &str, near: Option<&str>) -> Option<String> {
+        self.find(name).or_else(|| {
+            let mut prefix = near?;
+            while let Some((outer, _)) = prefix.rsplit_once('/') {
+                let own = format!("{outer}/{name}");
+                if self.frames().contains(&own.as_str()) {
+                    return Some(own);
+                }
+                prefix = outer;
+            }
+            None
+        })
+    }
+
     /// The edges from a frame up to its root, the nearest first, and the root.
     fn ancestors<'a>(&'a self, frame: &'a str) -> DataResult<(Vec<(&'a str, &'a Edge)>, &'a str)> {
         let (mut up, mut at) = (Vec::new(), frame);

@@ -115,6 +115,14 @@ fn stamps_of_another_machines_clock_are_noticed() {
         assert!(text.contains(&format!("/odom {:.3} s", 0.01 - 3600.0 * hours as f64)), "{text}");
         assert!(!text.contains("/tf "), "{text}");
     }
+    // Transforms that are dated ahead now and then, as localisation does.
+    let mut messages = run();
+    for i in 0..4 {
+        let t = START + i * TENTH;
+        let ahead = tf("/tf", t + 20 * TENTH, "map", "elsewhere", At(0.0, 0.0, 0.0, 0.0));
+        messages.push(Msg { nanos: t + 10_000_000, ..ahead });
+    }
+    assert_eq!(doubts(open(&messages).as_ref()), "");
     // The whole recording was played and recorded again a year later.
     let again = run().into_iter().map(|m| Msg { nanos: m.nanos + 31_536_000_000_000_000, ..m });
     assert_eq!(doubts(open(&again.collect::<Vec<_>>()).as_ref()), "");
@@ -145,6 +153,9 @@ fn a_topic_in_another_encoding_moves_no_other_out_of_its_role() {
             }
         }
     }
+    let foreign = [other("protobuf", "foxglove.RawImage"), other("json", "foxglove.Log")];
+    let error = Opened::new("run.mcap", &mcap(&foreign)).open(&[]).err().unwrap().to_string();
+    assert!(error.contains("that can be read: messages in json, protobuf are not (its topics: /"), "{error}");
     // The same topic in two encodings.
     let mut messages = run();
     let odom =

@@ -83,6 +83,44 @@ fn where_nothing_says_which_robot_is_meant_none_is_used() {
     assert!(open(&renamed).trajectory("odom").unwrap().path_length_m() < 0.2);
 }
 
+/// The run with a prefix before all of its frames, as the robots of a fleet have them.
+fn prefixed(prefix: &str, camera_frame: &str) -> Vec<Msg> {
+    let name = |frame: &str| format!("{prefix}{frame}");
+    let mut messages = vec![
+        tf("/tf_static", START, &name("base_footprint"), &name("optical"), At(0.05, 0.0, 0.6, 0.0)),
+        camera_info("/camera/color/camera_info", START, camera_frame),
+    ];
+    for i in 0..9_i64 {
+        let t = START + i * 50_000_000;
+        messages.push(tf(
+            "/tf",
+            t,
+            &name("odom"),
+            &name("base_footprint"),
+            At(0.01 * i as f64, 0.0, 0.0, 0.0),
+        ));
+        messages.push(image("/camera/color/image_raw", t, camera_frame, "mono8", i as u8));
+    }
+    messages
+}
+
+#[test]
+fn frames_of_several_robots_in_one_tf_are_told_apart_by_their_prefix() {
+    let other: Vec<Msg> =
+        prefixed("robot2/", "x").into_iter().filter(|m| m.topic.starts_with("/tf")).collect();
+    let messages: Vec<Msg> = prefixed("robot1/", "robot1/optical").into_iter().chain(other.clone()).collect();
+    let data = open(&messages);
+    assert!(facts(data.as_ref()).contains("base_frame robot1/base_footprint"), "{}", facts(data.as_ref()));
+    assert!(data.body_from_camera("color", at(0)).is_ok() && data.trajectory("odom").is_ok());
+    // Images that do not say whose they are.
+    let messages: Vec<Msg> = prefixed("robot1/", "optical").into_iter().chain(other).collect();
+    let text = open(&messages).body_from_camera("color", at(0)).unwrap_err().to_string();
+    assert!(
+        text.contains("it could be robot1/base_footprint, robot2/base_footprint (set base_frame"),
+        "{text}"
+    );
+}
+
 #[test]
 fn namespaces_that_do_not_contradict_are_one_tree() {
     let moved = run().into_iter().map(|m| match m.topic.as_str() {
