@@ -115,7 +115,7 @@ mod tests {
             assert!(line.contains(&format!("are {text} times the depth of the floor")), "{line}");
             assert!(doubt(|i| factor * (1.0 + 0.03 * (i as f64).sin())).is_some(), "a noisy camera");
         }
-        let some_off_the_floor = |i: usize| if i % 5 == 0 { 0.4 } else { 10.0 };
+        let some_off_the_floor = |i: usize| if i.is_multiple_of(5) { 0.4 } else { 10.0 };
         assert!(doubt(some_off_the_floor).is_some());
     }
 

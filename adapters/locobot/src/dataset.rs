@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::Vector3;
@@ -17,7 +18,7 @@ use vice_core::trajectory::Trajectory;
 use crate::camera::{Images, RosCamera, way_out};
 use crate::choose::{Frames, Topics};
 use crate::container::{Recording, Topic};
-use crate::doubts::Doubts;
+use crate::doubts::{Doubts, NO_CAMERA};
 use crate::pixels::{self, DepthUnit, Packing};
 use crate::series::PoseTopic;
 use crate::settings::Settings;
@@ -38,6 +39,8 @@ pub(crate) struct RosDataset {
     pub(crate) tf: TfTree,
     /// The camera in use; where several could be meant all of them, and none is the default.
     pub(crate) cameras: Vec<RosCamera>,
+    /// Whether one of several cameras was asked for by its name.
+    pub(crate) named: AtomicBool,
     pub(crate) depth: Option<Images>,
     pub(crate) depth_offset: Span,
     pub(crate) depth_unit: Option<DepthUnit>,
@@ -56,6 +59,7 @@ impl RosDataset {
 
     fn camera_of(&self, name: &str) -> DataResult<&RosCamera> {
         if let Some(camera) = self.cameras.iter().find(|c| c.is(name)) {
+            self.named.store(true, Ordering::Relaxed);
             return Ok(camera);
         }
         let problem = match (&self.chosen.color_problem, self.default_camera()) {
@@ -275,7 +279,12 @@ impl Dataset for RosDataset {
     }
 
     fn suspicions(&self) -> Vec<Suspicion> {
-        self.doubts.all()
+        let mut doubts = self.doubts.all();
+        let problem = self.chosen.color_problem.as_ref();
+        if let Some(problem) = problem.filter(|_| !self.named.load(Ordering::Relaxed)) {
+            doubts.push(Suspicion::new(NO_CAMERA, "", problem.as_str()).advice(way_out(&self.cameras)));
+        }
+        doubts
     }
 
     fn facts(&self) -> Vec<Fact> {

@@ -29,7 +29,7 @@ pub(crate) fn image_size_px(bytes: &[u8]) -> Option<(u32, u32)> {
             }
             // Without a length.
             0x01 | 0xd0..=0xd7 => at += 2,
-            0xd8 | 0xd9 | 0xda => return None,
+            0xd8..=0xda => return None,
             _ => at += 2 + usize::from(short(at + 2)?),
         }
     }

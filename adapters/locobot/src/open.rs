@@ -3,17 +3,18 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
 
 use vice_core::dataset::OpenOptions;
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::suspicion::Suspicion;
 use vice_core::time::Span;
 
-use crate::camera::{Images, RosCamera, way_out};
+use crate::camera::{Images, RosCamera};
 use crate::choose::{Frames, Topics, camera_name, info_beside};
 use crate::container::{Encoding, Recording, Topic, find};
 use crate::dataset::RosDataset;
-use crate::doubts::{DAMAGED, Doubts, NO_CAMERA, SEVERAL_TOPICS, TWO_SOURCES, group};
+use crate::doubts::{DAMAGED, Doubts, SEVERAL_TOPICS, TWO_SOURCES, group};
 use crate::index::Index;
 use crate::namespaces::{self, Asked};
 use crate::series::PoseTopic;
@@ -96,9 +97,6 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> DataResult<RosDataset>
     }
     let depth = chosen.depth.map(&mut images).transpose()?.flatten();
     name_apart(&mut cameras);
-    if let Some(problem) = chosen.color_problem.as_ref().filter(|_| chosen.color.is_none()) {
-        doubts.say(Suspicion::new(NO_CAMERA, "", problem.as_str()).advice(way_out(&cameras)));
-    }
     cameras.iter().for_each(|camera| doubts.say_all(camera.doubts()));
     let color = cameras.first().filter(|_| chosen.color.is_some());
     let depth_offset = depth_offset(&settings, color.map(|c| &c.images))?;
@@ -137,6 +135,7 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> DataResult<RosDataset>
         frames,
         tf,
         cameras,
+        named: AtomicBool::new(false),
         depth,
         depth_offset,
         depth_unit,

@@ -125,8 +125,9 @@ mod tests {
 
     #[test]
     fn a_turn_counts_too() {
-        let yaw =
-            |i: usize| UnitQuaternion::from_scaled_axis(Vector3::z() * if i % 2 == 0 { 0.0 } else { 2.0 });
+        let yaw = |i: usize| {
+            UnitQuaternion::from_scaled_axis(Vector3::z() * if i.is_multiple_of(2) { 0.0 } else { 2.0 })
+        };
         let poses: Vec<Transform> = (0..20).map(|i| Rigid::from_parts(Vector3::zeros(), yaw(i))).collect();
         let line = doubt("tf odom -> base", &poses).unwrap().line();
         assert!(line.starts_with("tf odom -> base: the poses jump to and fro"), "{line}");

@@ -155,6 +155,7 @@ fn of_two_cameras_none_is_taken_and_each_is_there_by_its_name() {
             assert!(!doubts(set.as_ref()).contains("no-camera"));
         }
         assert!(data.trajectory("odom").is_ok());
+        assert!(!doubts(data.as_ref()).contains("no-camera"), "one was asked for by its name");
     }
 }
 

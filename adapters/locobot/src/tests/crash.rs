@@ -101,6 +101,22 @@ fn without_a_usable_description_the_parts_are_found() {
 }
 
 #[test]
+fn messages_that_are_compressed_by_themselves_are_read_from_mcap_too() {
+    let pack = |m: Msg| {
+        let packed = zstd::bulk::compress(&m.bytes[1], 1).unwrap();
+        Msg { bytes: [Vec::new(), packed], ..m }
+    };
+    let packed: Vec<Msg> = run().into_iter().map(pack).collect();
+    let data = Opened::new("run.mcap", &mcap(&packed)).open(&[]).unwrap();
+    let plain = open(&run());
+    assert_eq!(data.image("color", 3).unwrap(), plain.image("color", 3).unwrap());
+    for stream in plain.streams() {
+        assert_eq!(data.trajectory(&stream).unwrap(), plain.trajectory(&stream).unwrap());
+    }
+    assert_eq!(doubts(data.as_ref()), "");
+}
+
+#[test]
 fn files_that_were_unpacked_or_packed_since_are_found() {
     let compressed = "  compression_format: zstd\n  compression_mode: FILE\n";
     for ending in ["db3", "mcap"] {
