@@ -67,7 +67,9 @@ impl Suspicion {
             line.push_str(": ");
             line.push_str(&self.evidence);
         }
-        if self.count > 1 {
+        // A message that counts for itself does not need it again.
+        let is_count = |word: &str| word.parse() == Ok(self.count);
+        if self.count > 1 && !self.message.split_whitespace().any(is_count) {
             line.push_str(&format!(", {} times", self.count));
         }
         if !self.advice.is_empty() {
@@ -144,6 +146,13 @@ mod tests {
         list.add(Suspicion::new("rows-left-out", "a.tum", "rows without a pose are left out").times(2));
         let counts: Vec<u64> = list.iter().map(|s| s.count).collect();
         assert_eq!(counts, [12, 1]);
+    }
+
+    #[test]
+    fn a_count_is_said_once() {
+        let counted = |message: &str| Suspicion::new("rows-left-out", "", message).times(10).line();
+        assert_eq!(counted("10 rows are left out"), "10 rows are left out");
+        assert_eq!(counted("rows of 100 are left out"), "rows of 100 are left out, 10 times");
     }
 
     #[test]

@@ -19,6 +19,7 @@ pub mod mesh;
 mod ply;
 #[cfg(test)]
 mod scene;
+mod units;
 pub mod zcam;
 pub mod zmap;
 

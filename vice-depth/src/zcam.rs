@@ -3,12 +3,15 @@
 //! Bilinear over those of the four neighbours that are valid, their weights renormalised. A neighbour without a
 //! reading (0 or NaN in the file) or out of the range asked for is not valid.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use vice_core::camera::Pixel;
-use vice_core::dataset::{Dataset, DepthImage, Floor};
+use vice_core::dataset::{Dataset, DepthImage, Floor, depth_unit_doubt};
 use vice_core::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
 use vice_core::error::{DataError, DataResult};
+use vice_core::suspicion::{Suspicion, Suspicions};
+
+use crate::units::AgainstFloor;
 
 /// How depth images are read.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +36,26 @@ pub struct ZCamDepth {
     options: ZCamOptions,
     /// The image decoded last, so that none is decoded twice for a key frame.
     last: Mutex<Option<(usize, Arc<DepthImage>)>>,
+    seen: Mutex<Seen>,
+}
+
+/// What was noticed on the way.
+#[derive(Debug, Default)]
+struct Seen {
+    against_floor: AgainstFloor,
+    said: Suspicions,
+}
+
+impl Seen {
+    /// Says a doubt, unless one of its kind was said before.
+    fn say(&mut self, camera: &str, doubt: Option<Suspicion>) {
+        let Some(doubt) = doubt else { return };
+        if self.said.iter().all(|s| s.code != doubt.code) {
+            let doubt = Suspicion { about: format!("depth of camera {camera}"), ..doubt };
+            tracing::warn!("{}", doubt.line());
+            self.said.add(doubt);
+        }
+    }
 }
 
 impl ZCamDepth {
@@ -50,7 +73,17 @@ impl ZCamDepth {
             let name = dataset.name();
             return Err(DataError::new(format!("{name} has no depth images for camera `{camera}`")));
         }
-        Ok(Self { dataset, camera: camera.to_string(), options, last: Mutex::new(None) })
+        Ok(Self {
+            dataset,
+            camera: camera.to_string(),
+            options,
+            last: Mutex::new(None),
+            seen: Mutex::default(),
+        })
+    }
+
+    fn seen(&self) -> MutexGuard<'_, Seen> {
+        self.seen.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The depth image of a frame; `None` where that frame has none.
@@ -66,6 +99,7 @@ impl ZCamDepth {
         if image.z_m().iter().all(|z| z.is_nan()) {
             tracing::warn!("{}: the depth image of frame {frame} has no valid value", self.dataset.name());
         }
+        self.seen().say(&self.camera, depth_unit_doubt(&image));
         let image = Arc::new(image);
         *last = Some((frame, Arc::clone(&image)));
         Ok(Some(image))
@@ -107,7 +141,16 @@ impl DepthSource for ZCamDepth {
             ))
             .hint("depth images have to be registered to the colour images"));
         }
-        Ok(pixels.iter().map(|px| sample(&image, *px, &self.options)).collect())
+        let depths: Vec<_> = pixels.iter().map(|px| sample(&image, *px, &self.options)).collect();
+        self.seen().against_floor.add(keyframe, pixels, &depths);
+        Ok(depths)
+    }
+
+    fn suspicions(&self) -> Vec<Suspicion> {
+        let mut seen = self.seen();
+        let doubt = seen.against_floor.doubt();
+        seen.say(&self.camera, doubt);
+        seen.said.iter().cloned().collect()
     }
 }
 

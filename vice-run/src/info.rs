@@ -1,10 +1,10 @@
 //! What a data set holds, in words.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::fmt::Write;
 
 use vice_core::dataset::{Dataset, Floor};
-use vice_core::suspicion::Suspicions;
+use vice_core::suspicion::{Suspicion, Suspicions};
 use vice_core::time::{Span, Stamp};
 
 use crate::error::RunResult;
@@ -19,14 +19,20 @@ pub fn describe(dataset: &dyn Dataset, camera: Option<&str>) -> RunResult<String
     writeln!(text, "{} ({})", printable(dataset.name()), printable(dataset.format()))?;
     writeln!(text, "cameras")?;
     let mut first_frame = None;
-    for name in dataset.cameras().iter().filter(|n| camera.is_none_or(|c| c == n.as_str())) {
+    // A camera that is asked for may be one of several that none of is listed.
+    let cameras = camera.map_or_else(|| dataset.cameras(), |name| vec![name.to_string()]);
+    for name in &cameras {
         first_frame = first_frame.or(describe_camera(&mut text, dataset, name)?);
     }
     describe_streams(&mut text, dataset)?;
-    let imu = dataset.imu()?;
-    if let (Some(first), Some(last)) = (imu.first(), imu.last()) {
-        writeln!(text, "imu")?;
-        writeln!(text, "  {}", stretch(imu.len(), first.stamp, last.stamp))?;
+    match dataset.imu() {
+        Ok(imu) => {
+            if let (Some(first), Some(last)) = (imu.first(), imu.last()) {
+                writeln!(text, "imu")?;
+                writeln!(text, "  {}", stretch(imu.len(), first.stamp, last.stamp))?;
+            }
+        }
+        Err(error) => writeln!(text, "imu\n  cannot be read: {}", printable(&error.to_string()))?,
     }
     if let Some(cloud) = dataset.cloud()? {
         writeln!(text, "point cloud")?;
@@ -45,9 +51,10 @@ pub fn describe(dataset: &dyn Dataset, camera: Option<&str>) -> RunResult<String
         };
         writeln!(text, "  {:.4} x + {:.4} y + {:.4} z + {d:.4} m = 0 in the {frame}", n.x, n.y, n.z)?;
     }
-    describe_suspicions(&mut text, dataset)?;
     let mut sections: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    let mut known: HashSet<String> = HashSet::new();
     for fact in dataset.facts() {
+        known.insert(fact.text.clone());
         sections.entry(fact.section).or_default().push(fact.text);
     }
     for (section, lines) in sections {
@@ -56,6 +63,7 @@ pub fn describe(dataset: &dyn Dataset, camera: Option<&str>) -> RunResult<String
             writeln!(text, "  {}", printable(&line))?;
         }
     }
+    describe_suspicions(&mut text, dataset, &known)?;
     Ok(text)
 }
 
@@ -111,14 +119,15 @@ fn describe_streams(text: &mut String, dataset: &dyn Dataset) -> RunResult<()> {
     Ok(())
 }
 
-/// What looked wrong while all this was read.
-fn describe_suspicions(text: &mut String, dataset: &dyn Dataset) -> RunResult<()> {
+/// What looked wrong while all this was read; what stands among the facts already is not said twice.
+fn describe_suspicions(text: &mut String, dataset: &dyn Dataset, known: &HashSet<String>) -> RunResult<()> {
     let suspicions: Suspicions = dataset.suspicions().into_iter().collect();
-    if !suspicions.is_empty() {
+    let mut new = suspicions.iter().map(Suspicion::line).filter(|line| !known.contains(line)).peekable();
+    if new.peek().is_some() {
         writeln!(text, "suspicions")?;
     }
-    for suspicion in suspicions.iter() {
-        writeln!(text, "  {}", printable(&suspicion.line()))?;
+    for line in new {
+        writeln!(text, "  {}", printable(&line))?;
     }
     Ok(())
 }

@@ -100,13 +100,23 @@ impl DatasetSpec {
         let names = dataset.cameras();
         match &self.camera {
             Some(name) if names.contains(name) => Ok(name.clone()),
-            Some(name) => {
-                let known = if names.is_empty() { "none".to_string() } else { names.join(", ") };
-                Err(RunError::usage("camera", format!("there is no camera {name}; there are {known}")))
-            }
-            None => names.into_iter().next().ok_or_else(|| {
-                RunError::missing(format!("{}: the data set has no camera", self.path.display()))
-            }),
+            // Where several cameras could be meant none is listed, and each is there by its name.
+            Some(name) if names.is_empty() && dataset.frames(name).is_ok() => Ok(name.clone()),
+            Some(_) if names.is_empty() => Err(self.no_camera(dataset)),
+            Some(name) => Err(RunError::usage(
+                "camera",
+                format!("there is no camera {name}; there are {}", names.join(", ")),
+            )),
+            None => names.into_iter().next().ok_or_else(|| self.no_camera(dataset)),
+        }
+    }
+
+    /// Why there is no camera: the data set may know.
+    fn no_camera(&self, dataset: &dyn Dataset) -> RunError {
+        let path = self.path.display();
+        match dataset.suspicions().into_iter().find(|s| s.code == "no-camera") {
+            Some(reason) => RunError::missing(format!("{path}: {}", reason.line())),
+            None => RunError::missing(format!("{path}: the data set has no camera")),
         }
     }
 

@@ -1,9 +1,58 @@
 //! From `sensor_msgs/CameraInfo` to a camera of the core.
 
-use vice_core::camera::{Camera, Model};
-use vice_core::error::{DataError, DataResult};
+use vice_core::camera::{Camera, CameraError, Model};
+use vice_core::error::{DataError, DataResult, ErrorKind};
+use vice_core::suspicion::Suspicion;
 
 use crate::message::CameraInfo;
+
+/// How many distortion coefficients a model of ROS has, at the most.
+fn most_coefficients(model: &str) -> Option<usize> {
+    match model.trim().to_ascii_lowercase().as_str() {
+        "plumb_bob" | "radtan" | "radial-tangential" | "brown_conrady" => Some(5),
+        "rational_polynomial" | "rational" => Some(8),
+        "equidistant" | "fisheye" | "kannala_brandt" => Some(4),
+        _ => None,
+    }
+}
+
+/// The distortion coefficients without the zeros by which drivers fill up a vector of a fixed length.
+///
+/// # Errors
+/// [`DataError`] with the model's name if a coefficient that the model does not have is not zero.
+fn unpadded(info: &CameraInfo) -> DataResult<&[f64]> {
+    let CameraInfo { model, distortion, .. } = info;
+    let Some(most) = most_coefficients(model).filter(|most| *most < distortion.len()) else {
+        return Ok(distortion);
+    };
+    let (used, padding) = distortion.split_at(most);
+    match padding.iter().position(|v| *v != 0.0) {
+        None => Ok(used),
+        Some(place) => {
+            let n = distortion.len();
+            let (place, value) = (most + place + 1, padding[place]);
+            let problem = format!(
+                "the model `{model}` has at most {most} distortion coefficients, there are {n} and number {place} is \
+                 {value}, not 0"
+            );
+            Err(DataError::of_kind(ErrorKind::Contradictory, problem)
+                .hint("the driver's name for the model may be wrong: give a calibration file"))
+        }
+    }
+}
+
+/// What to say of a distortion vector that was filled up with zeros.
+pub(crate) fn padding(info: &CameraInfo, rectified: bool) -> Option<Suspicion> {
+    let used = unpadded(info).ok().filter(|used| !rectified && used.len() < info.distortion.len())?;
+    let message = format!(
+        "the last {} of {} distortion coefficients are zero and left out: `{}` has {}",
+        info.distortion.len() - used.len(),
+        info.distortion.len(),
+        info.model,
+        used.len()
+    );
+    Some(Suspicion::new("distortion-padded", "", message))
+}
 
 /// The camera of a topic. Binning and region of interest are applied as ROS's `image_geometry` does.
 ///
@@ -28,9 +77,16 @@ pub(crate) fn camera(info: &CameraInfo, rectified: bool) -> DataResult<Camera> {
     (size_x, size_y) = (size_x / by_x, size_y / by_y);
     (fx, cx) = (fx / f64::from(by_x), cx / f64::from(by_x));
     (fy, cy) = (fy / f64::from(by_y), cy / f64::from(by_y));
-    let coefficients: &[f64] = if rectified { &[] } else { &info.distortion };
+    let coefficients: &[f64] = if rectified { &[] } else { unpadded(info)? };
     let name = if rectified || coefficients.is_empty() { "pinhole" } else { &info.model };
-    let model = Model::from_name(name, coefficients).map_err(|e| DataError::new(e.to_string()))?;
+    let model = Model::from_name(name, coefficients).map_err(|e| match e {
+        // By the name that the recording has for the model, not by the core's.
+        CameraError::CoefficientCount { expected, got, .. } => DataError::new(format!(
+            "the model `{}` takes {expected} distortion coefficients, got {got}",
+            info.model
+        )),
+        other => DataError::new(other.to_string()),
+    })?;
     Camera::new(size_x, size_y, [fx, fy, cx, cy], model).map_err(|e| DataError::new(e.to_string()))
 }
 
@@ -69,6 +125,37 @@ mod tests {
         assert_eq!((cut.width(), cut.height(), cut.fx_fy_cx_cy()), (200, 100, [400.0, 402.0, 300.0, 200.0]));
         let plain = CameraInfo { distortion: vec![], model: String::new(), ..info() };
         assert_eq!(camera(&plain, false).unwrap().model().name(), "pinhole");
+    }
+
+    #[test]
+    fn distortion_filled_up_with_zeros_is_that_of_the_model() {
+        let lens = |model: &str, used: &[f64], zeros: usize| {
+            let distortion = [used, &vec![0.0; zeros]].concat();
+            CameraInfo { model: model.to_string(), distortion, ..info() }
+        };
+        let cases: [(&str, &[f64]); 4] = [
+            ("plumb_bob", &[0.1, -0.2, 0.001, 0.002, 0.03]),
+            ("rational_polynomial", &[0.1, -0.2, 0.001, 0.002, 0.03, 0.3, 0.2, 0.1]),
+            ("equidistant", &[0.1, -0.2, 0.01, 0.02]),
+            ("Plumb_Bob", &[0.1, 0.0, 0.0, 0.0, 0.0]),
+        ];
+        for (model, used) in cases {
+            let plain = camera(&lens(model, used, 0), false).unwrap();
+            assert!(padding(&lens(model, used, 0), false).is_none());
+            for zeros in [1, 3, 4, 6, 10] {
+                let padded = lens(model, used, zeros);
+                assert_eq!(camera(&padded, false).unwrap(), plain, "{model} with {zeros} zeros");
+                assert!(padding(&padded, false).unwrap().message.contains(model));
+                let mut wrong = padded;
+                *wrong.distortion.last_mut().unwrap() = 0.05;
+                let text = camera(&wrong, false).unwrap_err().to_string();
+                assert!(text.contains(&format!("`{model}`")) && text.contains("is 0.05, not 0"), "{text}");
+                assert!(
+                    padding(&wrong, false).is_none() && camera(&wrong, true).is_ok(),
+                    "rectified has no lens"
+                );
+            }
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use vice_core::error::{DataError, DataResult};
 
 use crate::container::Topic;
+use crate::namespaces::holds;
 use crate::settings::Settings;
 use crate::tf::{TfTree, list};
 
@@ -22,8 +23,12 @@ pub(crate) struct Topics {
     pub(crate) depth: Option<usize>,
     pub(crate) info: Option<usize>,
     pub(crate) imu: Option<usize>,
+    /// The image topics that could be the camera's, where there are several and none is taken.
+    pub(crate) cameras: Vec<usize>,
     /// Why there is no camera, where there are images but none could be chosen.
     pub(crate) color_problem: Option<String>,
+    /// Why there are no depth images, where several topics have some.
+    pub(crate) depth_problem: Option<String>,
     /// Why there are no inertial samples, where several topics have some.
     pub(crate) imu_problem: Option<String>,
 }
@@ -34,32 +39,38 @@ impl Topics {
     /// # Errors
     /// [`DataError`] if a topic that was set does not exist.
     pub(crate) fn choose(topics: &[Topic], settings: &Settings) -> DataResult<Self> {
-        let chooser = Chooser { topics, settings };
+        let chooser = Chooser { topics, settings, beside: None };
         let mut chosen = Self::default();
         let images = ["sensor_msgs/Image", "sensor_msgs/CompressedImage"];
         match chooser.one("color_topic", COLOR, &images, |t| !is_depth(t)) {
             Pick::One(topic) => chosen.color = Some(topic),
             Pick::None => {}
-            Pick::Several(problem) => chosen.color_problem = Some(problem),
+            Pick::Several(cameras, problem) => {
+                (chosen.cameras, chosen.color_problem) = (cameras, Some(problem));
+            }
             Pick::Missing(error) => return Err(error),
         }
+        // What belongs to a robot stands in its namespace.
+        let chooser = Chooser { beside: chosen.color.map(|c| topics[c].name.as_str()), ..chooser };
         match chooser.one("depth_topic", DEPTH, &images, is_depth) {
             Pick::One(topic) => chosen.depth = Some(topic),
             Pick::None => {}
-            Pick::Several(problem) => tracing::warn!("no depth images are used: {problem}"),
+            Pick::Several(_, problem) => chosen.depth_problem = Some(problem),
             Pick::Missing(error) => return Err(error),
         }
         let beside = chosen.color.map_or(COLOR_INFO.to_string(), |c| info_beside(&topics[c].name));
-        match chooser.one("camera_info_topic", &beside, &["sensor_msgs/CameraInfo"], |t| !is_depth(t)) {
+        // One that lies near may still be another camera's: a calibration is taken by its own name or not at all.
+        let anywhere = Chooser { beside: None, ..chooser };
+        match anywhere.one("camera_info_topic", &beside, &["sensor_msgs/CameraInfo"], |t| !is_depth(t)) {
             Pick::One(topic) => chosen.info = Some(topic),
-            Pick::None | Pick::Several(_) => {}
+            Pick::None | Pick::Several(..) => {}
             Pick::Missing(error) => return Err(error),
         }
         // A driver that sends gyroscope and accelerometer apart has no topic with both.
         match chooser.one("imu_topic", IMU, &["sensor_msgs/Imu"], |t| !t.name.ends_with("/sample")) {
             Pick::One(topic) => chosen.imu = Some(topic),
             Pick::None => {}
-            Pick::Several(problem) => chosen.imu_problem = Some(problem),
+            Pick::Several(_, problem) => chosen.imu_problem = Some(problem),
             Pick::Missing(error) => return Err(error),
         }
         Ok(chosen)
@@ -87,7 +98,7 @@ fn without_transport(topic: &str) -> &str {
 }
 
 /// The calibration that a driver publishes beside an image topic.
-fn info_beside(image_topic: &str) -> String {
+pub(crate) fn info_beside(image_topic: &str) -> String {
     let plain = without_transport(image_topic);
     format!("{}/camera_info", plain.rsplit_once('/').map_or("", |(folder, _)| folder))
 }
@@ -99,19 +110,22 @@ fn is_depth(topic: &Topic) -> bool {
 enum Pick {
     One(usize),
     None,
-    Several(String),
+    Several(Vec<usize>, String),
     Missing(DataError),
 }
 
+#[derive(Clone, Copy)]
 struct Chooser<'a> {
     topics: &'a [Topic],
     settings: &'a Settings,
+    /// The topic of the camera, once it is chosen.
+    beside: Option<&'a str>,
 }
 
 impl Chooser<'_> {
     /// By the setting, by the default name, by that name behind a prefix, and then by type where only one is left.
     fn one(&self, key: &str, default: &str, kinds: &[&str], fits: fn(&Topic) -> bool) -> Pick {
-        let of_kind = |t: &&(usize, &Topic)| kinds.contains(&t.1.kind.as_str()) && t.1.count > 0;
+        let of_kind = |t: &&(usize, &Topic)| kinds.contains(&t.1.kind.as_str()) && t.1.is_read();
         let all: Vec<(usize, &Topic)> = self.topics.iter().enumerate().collect();
         let typed: Vec<(usize, &Topic)> = all.iter().filter(of_kind).copied().collect();
         if let Some(name) = self.settings.get(key) {
@@ -131,15 +145,32 @@ impl Chooser<'_> {
         }
         let behind = fitting.iter().filter(|(_, t)| without_transport(&t.name).ends_with(default));
         let behind: Vec<(usize, &Topic)> = behind.copied().collect();
-        let left = if behind.is_empty() { fitting } else { behind };
+        let left = self.nearest(if behind.is_empty() { fitting } else { behind });
         let mut plain: Vec<&str> = left.iter().map(|(_, t)| without_transport(&t.name)).collect();
         plain.sort_unstable();
         plain.dedup();
         match plain.as_slice() {
             [] => Pick::None,
             [only] => named(&left, |t| t == *only).map_or(Pick::None, Pick::One),
-            several => Pick::Several(format!("several topics could be the {key}: {}; set it", list(several))),
+            several => {
+                let each = several.iter().filter_map(|name| named(&left, |t| t == *name)).collect();
+                let problem = format!("several topics could be the {key}: {}; set it", list(several));
+                Pick::Several(each, problem)
+            }
         }
+    }
+
+    /// Those in the innermost namespace around the camera that has any; all of them where there is no such namespace.
+    fn nearest<'t>(&self, topics: Vec<(usize, &'t Topic)>) -> Vec<(usize, &'t Topic)> {
+        let mut space = self.beside.unwrap_or_default();
+        while let Some((outer, _)) = space.rsplit_once('/') {
+            let inside: Vec<_> = topics.iter().filter(|(_, t)| holds(outer, &t.name)).copied().collect();
+            if !outer.is_empty() && !inside.is_empty() {
+                return inside;
+            }
+            space = outer;
+        }
+        topics
     }
 }
 
@@ -186,13 +217,13 @@ impl Frames {
             })
         };
         let base = set("base_frame")?
-            .or_else(|| tf.find("base_footprint"))
-            .or_else(|| tf.find("base_link"))
+            .or_else(|| tf.find_near("base_footprint", camera))
+            .or_else(|| tf.find_near("base_link", camera))
             .or_else(|| child.filter(|c| !c.is_empty()).map(str::to_string));
         Ok(Self {
-            odom: set("odom_frame")?.or_else(|| tf.find("odom")),
-            map: set("map_frame")?.or_else(|| tf.find("map")),
-            floor: set("floor_frame")?.or_else(|| tf.find("base_footprint")),
+            odom: set("odom_frame")?.or_else(|| tf.find_near("odom", camera)),
+            map: set("map_frame")?.or_else(|| tf.find_near("map", camera)),
+            floor: set("floor_frame")?.or_else(|| tf.find_near("base_footprint", camera)),
             camera: set("camera_frame")?.or_else(|| camera.filter(|c| !c.is_empty()).map(str::to_string)),
             base,
         })
@@ -209,6 +240,7 @@ mod tests {
             name: (*name).to_string(),
             kind: format!("sensor_msgs/{kind}"),
             encoding: Encoding::Cdr,
+            format: "cdr".to_string(),
             count: 1,
             recorded: None,
         };
@@ -248,6 +280,36 @@ mod tests {
         let two = choose(&[("/left/image_raw", "Image"), ("/right/image_raw", "Image")]);
         assert_eq!(two.color, None);
         assert!(two.color_problem.unwrap().contains("/left/image_raw, /right/image_raw; set it"));
+        assert_eq!(two.cameras, [0, 1]);
+    }
+
+    #[test]
+    fn of_several_robots_that_of_the_camera_counts() {
+        let robots = choose(&[
+            ("/robot1/imu/data", "Imu"),
+            ("/robot1/front/depth/image_raw", "Image"),
+            ("/robot2/imu/data", "Imu"),
+            ("/robot2/front/depth/image_raw", "Image"),
+            ("/robot2/front/image_raw", "Image"),
+            ("/robot2/front/camera_info", "CameraInfo"),
+            ("/robot1/front/camera_info", "CameraInfo"),
+        ]);
+        assert_eq!(
+            (robots.color, robots.info, robots.depth, robots.imu),
+            (Some(4), Some(5), Some(3), Some(2))
+        );
+        let beside_none = choose(&[("/cam/image_raw", "Image"), ("/a/imu", "Imu"), ("/b/imu", "Imu")]);
+        assert!(beside_none.imu.is_none() && beside_none.imu_problem.unwrap().contains("/a/imu, /b/imu"));
+        let robots = choose(&[("/cam/image_raw", "Image"), ("/a/depth", "Image"), ("/b/depth", "Image")]);
+        assert!(robots.depth_problem.unwrap().contains("several topics could be the depth_topic"));
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_not_chosen() {
+        let mut topics =
+            topics(&[("/json/image", "Image"), ("/cam/image", "Image"), ("/none/image", "Image")]);
+        (topics[0].encoding, topics[2].count) = (Encoding::Other, 0);
+        assert_eq!(Topics::choose(&topics, &Settings::default()).unwrap().color, Some(1));
     }
 
     #[test]

@@ -2,37 +2,30 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::Vector3;
 use vice_core::camera::Camera;
-use vice_core::dataset::{Dataset, DepthImage, Fact, Floor, GROUND_TRUTH, Image, Plane};
-use vice_core::error::{DataError, DataResult, one_line};
+use vice_core::dataset::{Dataset, DepthImage, Fact, Floor, GROUND_TRUTH, Image, Plane, depth_unit_doubt};
+use vice_core::error::{DataError, DataResult, ErrorKind, one_line};
 use vice_core::frames::{BodyFromCamera, Sensor};
 use vice_core::imu::{ImuSample, InertialState, fit_velocity};
+use vice_core::suspicion::Suspicion;
 use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
 
-use crate::choose::{Frames, Topics, is_rectified};
-use crate::container::{Locator, Recording, Topic};
-use crate::index::{InfoTopic, PoseTopic};
-use crate::pixels::{self, Packing};
+use crate::camera::{Images, RosCamera, way_out};
+use crate::choose::{Frames, Topics};
+use crate::container::{Recording, Topic};
+use crate::doubts::{Doubts, NO_CAMERA};
+use crate::pixels::{self, DepthUnit, Packing};
+use crate::series::PoseTopic;
 use crate::settings::Settings;
 use crate::streams::{self, GroundTruth, ODOM, SLAM};
 use crate::tf::{TfTree, Transform, list};
 use crate::wire::Reader;
-use crate::{calibration, facts, imu};
-
-/// The images of a topic that is in use.
-#[derive(Debug)]
-pub(crate) struct Images {
-    pub(crate) topic: String,
-    pub(crate) packing: Packing,
-    pub(crate) frame: String,
-    pub(crate) encoding: String,
-    pub(crate) stamps: Arc<[Stamp]>,
-    pub(crate) locators: Vec<Locator>,
-}
+use crate::{facts, imu};
 
 /// An opened recording.
 pub(crate) struct RosDataset {
@@ -44,35 +37,42 @@ pub(crate) struct RosDataset {
     pub(crate) chosen: Topics,
     pub(crate) frames: Frames,
     pub(crate) tf: TfTree,
-    pub(crate) camera: String,
-    pub(crate) color: Option<Images>,
+    /// The camera in use; where several could be meant all of them, and none is the default.
+    pub(crate) cameras: Vec<RosCamera>,
+    /// Whether one of several cameras was asked for by its name.
+    pub(crate) named: AtomicBool,
     pub(crate) depth: Option<Images>,
     pub(crate) depth_offset: Span,
-    pub(crate) info: Option<InfoTopic>,
+    pub(crate) depth_unit: Option<DepthUnit>,
     pub(crate) poses: BTreeMap<String, PoseTopic>,
     pub(crate) ground_truth: Option<GroundTruth>,
     pub(crate) fixed_camera: Option<Transform>,
-    pub(crate) damage: Vec<String>,
+    pub(crate) doubts: Doubts,
     pub(crate) imu: OnceLock<Result<Arc<[ImuSample]>, String>>,
 }
 
 impl RosDataset {
-    fn color(&self, camera: &str) -> DataResult<&Images> {
-        match &self.color {
-            Some(color) if camera == self.camera => Ok(color),
-            Some(_) => {
-                Err(DataError::new(format!("no camera `{camera}`"))
-                    .hint(format!("there is: {}", self.camera)))
-            }
-            None => Err(self.no_camera()),
-        }
+    /// The camera that is used where none is named.
+    pub(crate) fn default_camera(&self) -> Option<&RosCamera> {
+        self.cameras.first().filter(|_| self.chosen.color.is_some())
     }
 
-    fn no_camera(&self) -> DataError {
-        let problem = self.chosen.color_problem.clone();
-        DataError::new(problem.unwrap_or_else(|| "no topic has colour or gray images".to_string()))
-            .at(&self.path)
-            .hint("set color_topic")
+    fn camera_of(&self, name: &str) -> DataResult<&RosCamera> {
+        if let Some(camera) = self.cameras.iter().find(|c| c.is(name)) {
+            self.named.store(true, Ordering::Relaxed);
+            return Ok(camera);
+        }
+        let problem = match (&self.chosen.color_problem, self.default_camera()) {
+            (_, Some(camera)) => {
+                return Err(DataError::of_kind(ErrorKind::Missing, format!("no camera `{name}`"))
+                    .hint(format!("there is: {}", camera.name)));
+            }
+            (Some(problem), None) => problem.as_str(),
+            (None, None) => "no topic has colour or gray images",
+        };
+        let hint =
+            if self.cameras.is_empty() { "set color_topic".to_string() } else { way_out(&self.cameras) };
+        Err(DataError::of_kind(ErrorKind::Missing, problem).at(&self.path).hint(hint))
     }
 
     /// Reads and decodes a message of an image topic.
@@ -87,19 +87,34 @@ impl RosDataset {
             return Err(DataError::new(format!("topic {}: no frame {index}, there are {n}", images.topic)));
         };
         let payload = self.recording.read(locator)?;
-        let encoding = self.topics.iter().find(|t| t.name == images.topic).map(|t| t.encoding);
-        let encoding = encoding.unwrap_or(crate::container::Encoding::Other);
-        let reader = Reader::new(payload.bytes(), encoding).map_err(|e| DataError::new(e.to_string()));
+        let reader = Reader::new(payload.bytes(), images.wire).map_err(|e| DataError::new(e.to_string()));
         reader.and_then(|r| decode(r, images.packing)).map_err(|e| {
             let problem = format!("topic {}, frame {index}: {}", images.topic, one_line(&e));
-            self.recording.place(locator, DataError::new(problem))
+            self.recording.place(locator, DataError::of_kind(e.kind(), problem))
         })
+    }
+
+    /// Looks once at the first depth image, for `vice info`: evaluating looks at each that it uses.
+    fn look_at_depth(&self) {
+        let Some(depth) = &self.depth else { return };
+        let image = self.decode(depth, 0, |r, packing| pixels::depth(r, packing, self.depth_unit));
+        if let Ok(image) = image {
+            let doubt = depth_unit_doubt(&image);
+            self.doubts.say_all(doubt.map(|s| Suspicion { about: format!("topic {}", depth.topic), ..s }));
+        }
     }
 
     /// `body_from_frame` of a frame of tf.
     fn base(&self) -> DataResult<&str> {
+        self.tf.decided().map_err(|e| e.at(&self.path))?;
         self.frames.base.as_deref().ok_or_else(|| {
-            DataError::new("the frame of the body is not known: tf has neither base_footprint nor base_link")
+            let several =
+                [self.tf.behind_prefixes("base_footprint"), self.tf.behind_prefixes("base_link")].concat();
+            let why = match several.len() {
+                0 | 1 => "tf has neither base_footprint nor base_link".to_string(),
+                _ => format!("it could be {}", list(&several)),
+            };
+            DataError::of_kind(ErrorKind::Missing, format!("the frame of the body is not known: {why}"))
                 .at(&self.path)
                 .hint(format!("set base_frame; frames of tf: {}", list(&self.tf.frames())))
         })
@@ -121,50 +136,32 @@ impl Dataset for RosDataset {
     }
 
     fn cameras(&self) -> Vec<String> {
-        self.color.iter().map(|_| self.camera.clone()).collect()
+        self.default_camera().iter().map(|camera| camera.name.clone()).collect()
     }
 
     fn camera(&self, camera: &str) -> DataResult<Camera> {
-        let color = self.color(camera)?;
-        let Some(info) = &self.info else {
-            let infos = self.topics.iter().filter(|t| t.kind == "sensor_msgs/CameraInfo" && t.count > 0);
-            let infos: Vec<&str> = infos.map(|t| t.name.as_str()).collect();
-            return Err(DataError::new(format!(
-                "topic {} has no camera_info that belongs to it",
-                color.topic
-            ))
-            .at(&self.path)
-            .hint(format!(
-                "set camera_info_topic, or give a calibration file; there are: {}",
-                list(&infos)
-            )));
-        };
-        calibration::camera(&info.info, is_rectified(&color.topic)).map_err(|e| {
-            let topic = self.chosen.info.map_or("camera_info", |t| self.topics[t].name.as_str());
-            DataError::new(format!("topic {topic}: {}", one_line(&e))).at(&self.path)
-        })
+        self.camera_of(camera)?.camera(&self.topics).map_err(|e| e.at(&self.path))
     }
 
     fn frames(&self, camera: &str) -> DataResult<Arc<[Stamp]>> {
-        self.color(camera).map(|c| Arc::clone(&c.stamps))
+        self.camera_of(camera).map(|c| Arc::clone(&c.images.stamps))
     }
 
     fn image(&self, camera: &str, index: usize) -> DataResult<Image> {
-        let color = self.color(camera)?;
-        self.decode(color, index, pixels::image)
+        self.decode(&self.camera_of(camera)?.images, index, pixels::image)
     }
 
     fn image_file(&self, camera: &str, index: usize) -> DataResult<Option<Vec<u8>>> {
-        let color = self.color(camera)?;
-        self.decode(color, index, pixels::file)
+        self.decode(&self.camera_of(camera)?.images, index, pixels::file)
     }
 
     fn body_from_camera(&self, camera: &str, stamp: Stamp) -> DataResult<BodyFromCamera> {
-        self.color(camera)?;
+        let camera = self.camera_of(camera)?;
         if let Some(fixed) = &self.fixed_camera {
             return Ok(fixed.reinterpret());
         }
-        let camera_frame = self.frames.camera.as_deref().ok_or_else(|| {
+        let of_images = Some(camera.images.frame.as_str()).filter(|frame| !frame.is_empty());
+        let camera_frame = self.frames.camera.as_deref().or(of_images).ok_or_else(|| {
             DataError::new("the images do not name their frame").at(&self.path).hint("set camera_frame")
         })?;
         let base = self.base()?;
@@ -173,7 +170,7 @@ impl Dataset for RosDataset {
         }
         let chain = self.tf.chain(base, camera_frame).map_err(|e| {
             let problem = format!("the camera has no place in the body: {}", one_line(&e));
-            DataError::new(problem)
+            DataError::of_kind(e.kind(), problem)
                 .at(&self.path)
                 .hint("set base_frame and camera_frame, urdf or body_from_camera")
         })?;
@@ -190,7 +187,7 @@ impl Dataset for RosDataset {
         let of_topic = |name: &str, child: Option<&str>| {
             let topic = self.poses.get(name)?;
             let child = child.unwrap_or(&topic.child);
-            Some(streams::topic_trajectory(topic, name, child, &self.tf, base))
+            Some(streams::topic_trajectory(topic, name, child, &self.tf, base, &self.doubts))
         };
         let trajectory = match (stream, &self.ground_truth) {
             (GROUND_TRUTH, Some(GroundTruth::File(trajectory))) => Some(Ok(trajectory.clone())),
@@ -198,9 +195,9 @@ impl Dataset for RosDataset {
                 of_topic(name, self.settings.get("ground_truth_frame"))
             }
             (ODOM | SLAM, _) => {
-                let stamps = self.color.as_ref().map_or(&[][..], |c| &c.stamps);
+                let stamps: Vec<&[Stamp]> = self.cameras.iter().map(|c| c.images.stamps.as_ref()).collect();
                 let chain = streams::tf_chain(&self.tf, &self.frames, stream);
-                Some(chain.and_then(|chain| streams::tf_trajectory(&chain, stamps, stream)))
+                Some(chain.and_then(|chain| streams::tf_trajectory(&chain, &stamps.concat(), stream)))
             }
             (name, _) => of_topic(name, None),
         };
@@ -220,7 +217,7 @@ impl Dataset for RosDataset {
         let samples = self.imu.get_or_init(|| {
             let stamps = self.settings.stamps().map_err(|e| e.to_string())?;
             let base = self.base().map_err(|e| e.to_string())?;
-            imu::read(&self.recording, name, stamps, &self.tf, base).map_err(|e| one_line(&e))
+            imu::read(&self.recording, name, stamps, &self.tf, base, &self.doubts).map_err(|e| one_line(&e))
         });
         samples.clone().map_err(|problem| DataError::new(format!("topic {name}: {problem}")).at(&self.path))
     }
@@ -245,20 +242,23 @@ impl Dataset for RosDataset {
     }
 
     fn depth_image(&self, camera: &str, index: usize) -> DataResult<Option<DepthImage>> {
-        let color = self.color(camera)?;
-        let Some(depth) = &self.depth else { return Ok(None) };
-        let Some(stamp) = color.stamps.get(index) else {
-            return Err(DataError::new(format!("no frame {index}, there are {}", color.stamps.len())));
+        let stamps = &self.camera_of(camera)?.images.stamps;
+        let Some(depth) = self.depth.as_ref().filter(|_| self.default_camera().is_some()) else {
+            return Ok(None);
+        };
+        let Some(stamp) = stamps.get(index) else {
+            return Err(DataError::new(format!("no frame {index}, there are {}", stamps.len())));
         };
         let after = depth.stamps.partition_point(|s| s < stamp);
         let beside = [after.checked_sub(1), (after < depth.stamps.len()).then_some(after)];
         let off = |i: &usize| depth.stamps[*i].since(*stamp).abs();
         let nearest = beside.into_iter().flatten().min_by_key(off).filter(|i| off(i) <= self.depth_offset);
-        nearest.map(|i| self.decode(depth, i, pixels::depth)).transpose()
+        let decode = |r: Reader<'_>, packing: Packing| pixels::depth(r, packing, self.depth_unit);
+        nearest.map(|i| self.decode(depth, i, decode)).transpose()
     }
 
     fn has_depth(&self, camera: &str) -> bool {
-        camera == self.camera && self.color.is_some() && self.depth.is_some()
+        self.depth.is_some() && self.default_camera().is_some_and(|c| c.is(camera))
     }
 
     fn floor(&self, keyframe: Stamp) -> DataResult<Floor> {
@@ -278,7 +278,17 @@ impl Dataset for RosDataset {
         Ok(Floor::Body(Plane::<Sensor>::z_zero().transformed(&body_from_floor.reinterpret())))
     }
 
+    fn suspicions(&self) -> Vec<Suspicion> {
+        let mut doubts = self.doubts.all();
+        let problem = self.chosen.color_problem.as_ref();
+        if let Some(problem) = problem.filter(|_| !self.named.load(Ordering::Relaxed)) {
+            doubts.push(Suspicion::new(NO_CAMERA, "", problem.as_str()).advice(way_out(&self.cameras)));
+        }
+        doubts
+    }
+
     fn facts(&self) -> Vec<Fact> {
+        self.look_at_depth();
         facts::facts(self)
     }
 }

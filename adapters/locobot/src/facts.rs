@@ -2,8 +2,9 @@
 
 use vice_core::dataset::Fact;
 
-use crate::container::Topic;
-use crate::dataset::{Images, RosDataset};
+use crate::camera::Images;
+use crate::container::{Encoding, Topic};
+use crate::dataset::RosDataset;
 use crate::streams::GroundTruth;
 
 /// The lines.
@@ -24,12 +25,12 @@ pub(crate) fn facts(data: &RosDataset) -> Vec<Fact> {
     }
     let name = |topic: Option<usize>| topic.map_or("none", |t| data.topics[t].name.as_str()).to_string();
     let frame = |frame: &Option<String>| frame.clone().unwrap_or_else(|| "none".to_string());
-    let images = |images: &Option<Images>| match images {
+    let images = |images: Option<&Images>| match images {
         Some(i) => format!("{} ({}, frame {})", i.topic, i.encoding, i.frame),
         None => "none".to_string(),
     };
-    add("chosen", format!("color_topic {}", images(&data.color)));
-    add("chosen", format!("depth_topic {}", images(&data.depth)));
+    add("chosen", format!("color_topic {}", images(data.default_camera().map(|c| &c.images))));
+    add("chosen", format!("depth_topic {}", images(data.depth.as_ref())));
     add("chosen", format!("camera_info_topic {}", name(data.chosen.info)));
     add("chosen", format!("imu_topic {}", name(data.chosen.imu)));
     add("chosen", format!("base_frame {}", frame(&data.frames.base)));
@@ -38,7 +39,7 @@ pub(crate) fn facts(data: &RosDataset) -> Vec<Fact> {
     add("chosen", format!("floor_frame {}", frame(&data.frames.floor)));
     add("chosen", format!("camera_frame {}", frame(&data.frames.camera)));
     for (topic, poses) in &data.poses {
-        let child = if poses.child.is_empty() { "the body" } else { &poses.child };
+        let child = if poses.child.is_empty() { "a frame without a name" } else { &poses.child };
         add("poses", format!("{topic}: {} of {child} in {}", poses.poses.len(), poses.parent));
     }
     match &data.ground_truth {
@@ -46,17 +47,21 @@ pub(crate) fn facts(data: &RosDataset) -> Vec<Fact> {
         Some(GroundTruth::File(t)) => add("chosen", format!("ground_truth file with {} poses", t.len())),
         None => {}
     }
-    for line in &data.damage {
-        add("damage", line.clone());
+    for line in data.doubts.damage() {
+        add("damage", line);
     }
     facts
 }
 
 fn topic_line(topic: &Topic) -> String {
-    let Topic { name, kind, count, recorded, .. } = topic;
+    let Topic { name, kind, count, recorded, encoding, format } = topic;
     let rate = recorded.and_then(|(first, last)| {
         let rate = (count.checked_sub(1)?) as f64 / last.since(first).as_secs_f64();
         (rate.is_finite() && rate > 0.0).then(|| format!(", {rate:.1} Hz"))
     });
-    format!("{name}  {kind}  {count} messages{}", rate.unwrap_or_default())
+    let unread = match encoding {
+        Encoding::Other => format!(", {format}: not read"),
+        Encoding::Ros1 | Encoding::Cdr => String::new(),
+    };
+    format!("{name}  {kind}  {count} messages{}{unread}", rate.unwrap_or_default())
 }

@@ -4,10 +4,18 @@
 //! container/   ROS 1 bag, MCAP, sqlite3: one reader; bytes of messages, nothing of what they mean
 //! wire         ROS 1 serialisation and CDR through one reader
 //! message      the messages, each described once
-//! index        the pass over a recording: small messages decoded, images found
+//! doubts       what looks wrong, said once
+//! lenient      which poses are none, and which are mended
+//! to_and_fro   two sources in one series
 //! tf, urdf     which frame hangs on which
+//! namespaces   the tf of several robots
+//! series       what is kept of a topic
+//! index        the pass over a recording: small messages decoded, images found
 //! choose       topics and frames: as set, by LoCoBot's names, else by type
+//! complete     joints that tf lacks
+//! clocks       stamps of other machines
 //! streams, imu, calibration, pixels      to the core's conventions
+//! camera       images and the calibration that belongs to them
 //! dataset      the data set
 //! ```
 //!
@@ -16,15 +24,23 @@
 #![forbid(unsafe_code)]
 
 mod calibration;
+mod camera;
 mod choose;
+mod clocks;
+mod complete;
 mod container;
 mod dataset;
+mod doubts;
 mod facts;
+mod image_size;
 mod imu;
 mod index;
+mod lenient;
 mod message;
+mod namespaces;
 mod open;
 mod pixels;
+mod series;
 mod settings;
 mod streams;
 #[cfg(test)]
@@ -32,6 +48,7 @@ mod testing;
 #[cfg(test)]
 mod tests;
 mod tf;
+mod to_and_fro;
 mod urdf;
 mod wire;
 

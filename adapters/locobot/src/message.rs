@@ -1,9 +1,7 @@
 //! The messages that are read, each described once for ROS 1 and ROS 2.
 
-use vice_core::frames::{FrameError, Rigid};
-
-use crate::tf::{Tf, Transform};
-use crate::wire::{Header, Reader, WireError, WireResult};
+use crate::lenient::RawPose;
+use crate::wire::{Header, Reader, WireResult};
 
 /// `sensor_msgs/Image` before its pixels.
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +46,27 @@ pub(crate) struct CameraInfo {
     pub(crate) roi: [u32; 4],
 }
 
+impl CameraInfo {
+    /// Whether it has a focal length: a driver without a calibration sends zeros.
+    pub(crate) fn is_calibrated(&self) -> bool {
+        self.k[0] != 0.0 || self.p[0] != 0.0
+    }
+
+    /// What differs from another one, in a few words.
+    pub(crate) fn difference(&self, other: &Self) -> String {
+        let size = |info: &Self| format!("{}x{}", info.width, info.height);
+        let intrinsics =
+            |info: &Self| format!("fx {} fy {} cx {} cy {}", info.k[0], info.k[4], info.k[2], info.k[5]);
+        let window = |info: &Self| format!("binning {:?} roi {:?}", info.binning, info.roi);
+        let lens = |info: &Self| format!("{} {:?}", info.model, info.distortion);
+        let projection = |info: &Self| format!("P {:?}", info.p);
+        let frame = |info: &Self| format!("frame {}", info.frame);
+        let views: [&dyn Fn(&Self) -> String; 6] = [&size, &intrinsics, &window, &lens, &projection, &frame];
+        let first = views.iter().map(|view| (view(self), view(other))).find(|(a, b)| a != b);
+        first.map_or_else(|| "the rectification".to_string(), |(a, b)| format!("{a}, later {b}"))
+    }
+}
+
 /// Reads `sensor_msgs/CameraInfo`.
 pub(crate) fn camera_info(r: &mut Reader<'_>) -> WireResult<CameraInfo> {
     let frame = r.header()?.frame.to_string();
@@ -68,7 +87,8 @@ pub(crate) struct FramedPose<'a> {
     pub(crate) header: Header<'a>,
     /// The frame whose pose it is; empty where the message does not say.
     pub(crate) child: &'a str,
-    pub(crate) parent_from_child: Transform,
+    /// Taken as it is; [`crate::lenient::Tally::take`] says whether it is a pose.
+    pub(crate) parent_from_child: RawPose,
 }
 
 /// How a message with a pose is laid out.
@@ -110,11 +130,10 @@ pub(crate) fn tf_message<'a>(r: &mut Reader<'a>, mut each: impl FnMut(FramedPose
 }
 
 /// `geometry_msgs/Pose` and `Transform` are alike: a vector and a quaternion xyzw.
-fn transform(r: &mut Reader<'_>) -> WireResult<Transform> {
-    let translation = r.f64s()?;
+fn transform(r: &mut Reader<'_>) -> WireResult<RawPose> {
+    let translation_m = r.f64s()?;
     let [x, y, z, w] = r.f64s()?;
-    Rigid::<Tf, Tf>::try_from_parts(translation, [w, x, y, z])
-        .map_err(|e: FrameError| WireError(e.to_string()))
+    Ok(RawPose { translation_m, rotation_wxyz: [w, x, y, z] })
 }
 
 /// `sensor_msgs/Imu` without orientation.

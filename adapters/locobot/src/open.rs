@@ -1,23 +1,30 @@
 //! Opening a recording: the index pass, what tf lacks, and the choice of topics and frames.
 
+use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
 
 use vice_core::dataset::OpenOptions;
-use vice_core::error::{DataError, DataResult};
-use vice_core::time::{Span, Stamp};
+use vice_core::error::{DataError, DataResult, ErrorKind};
+use vice_core::suspicion::Suspicion;
+use vice_core::time::Span;
 
-use crate::choose::{Frames, Topics, camera_name};
+use crate::camera::{Images, RosCamera};
+use crate::choose::{Frames, Topics, camera_name, info_beside};
 use crate::container::{Encoding, Recording, Topic, find};
-use crate::dataset::{Images, RosDataset};
-use crate::index::{ImageTopic, Index, Only};
-use crate::message::joint_state;
-use crate::settings::{Settings, Stamps};
+use crate::dataset::RosDataset;
+use crate::doubts::{DAMAGED, Doubts, SEVERAL_TOPICS, TWO_SOURCES, group};
+use crate::index::Index;
+use crate::namespaces::{self, Asked};
+use crate::series::PoseTopic;
+use crate::settings::Settings;
 use crate::streams::GroundTruth;
-use crate::tf::TfBuilder;
-use crate::urdf;
-use crate::wire::Reader;
+use crate::tf::{TfTree, list};
+use crate::{clocks, complete};
 
+/// Places of damage that are named one by one.
+const SHOWN_PLACES: usize = 5;
 /// How far a depth image may be from a frame where the period of the frames is not known.
 const LONE_FRAME_OFFSET: Span = Span::from_millis(20);
 
@@ -38,72 +45,85 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> DataResult<RosDataset>
         }
     };
     let settings = Settings::load(path, options)?;
+    let depth_unit = settings.depth_unit()?;
+    let doubts = Doubts::default();
+    doubts.say_all(found.notes.iter().cloned());
     let recording = Recording::open(&found)?;
     let mut index = Index::new(settings.stamps()?);
     let scan = recording.scan(&mut index)?;
-    let mut damage = Vec::new();
-    warn(scan.damage, &mut damage);
-    let broken = index.broken_lines(&recording, &scan.topics);
-    warn(broken, &mut damage);
+    doubts.say_all(damage(scan.damage));
+    doubts.say_all(index.broken(&recording, &scan.topics));
     let topics = scan.topics;
-    check_use(&topics, path, &damage)?;
-    complete_tf(&recording, &settings, &mut index)?;
-    let tf = std::mem::take(&mut index.tf).finish();
-    warn(tf.notes.clone(), &mut damage);
-    match tf.roots() {
-        Ok(roots) if roots.len() > 1 => {
-            let trees: Vec<String> =
-                roots.iter().map(|(root, n)| format!("{root} (with {n} under it)")).collect();
-            warn(
-                vec![format!("tf has {} trees that are not connected: {}", roots.len(), trees.join(", "))],
-                &mut damage,
-            );
-        }
-        Ok(_) => {}
-        Err(cycle) => warn(vec![cycle.to_string()], &mut damage),
-    }
+    doubts.say_all(unread(&topics));
+    check_use(&topics, path, &doubts)?;
     let chosen = Topics::choose(&topics, &settings).map_err(|e| e.at(path))?;
-    let mut images = |topic: Option<usize>| -> DataResult<Option<Images>> {
-        let Some(topic) = topic else { return Ok(None) };
-        let Some(found) = index.images.remove(&topic) else { return Ok(None) };
-        frames_of(&recording, &topics[topic], found, &mut damage).map(Some)
+    for problem in [&chosen.depth_problem, &chosen.imu_problem].into_iter().flatten() {
+        doubts.say(Suspicion::new(SEVERAL_TOPICS, "", format!("none is used: {problem}")));
+    }
+    doubts.say_all(clocks::doubt(&topics, &chosen, &index));
+    let color_topic = chosen.color.map(|t| topics[t].name.as_str());
+    let image_frame = chosen.color.and_then(|t| index.images.get(&t)).map(|i| i.frame.clone());
+    let tf =
+        choose_tf(&recording, &settings, &topics, &mut index, color_topic, image_frame.as_deref(), &doubts)
+            .map_err(|e| e.at(path))?;
+    let mut images = |topic: usize| -> DataResult<Option<Images>> {
+        let found = index.images.remove(&topic);
+        found.map(|found| Images::new(&recording, &topics[topic], found, &doubts)).transpose()
     };
-    let (color, depth) = (images(chosen.color)?, images(chosen.depth)?);
-    let depth_offset = depth_offset(&settings, color.as_ref())?;
-    let info = chosen.info.and_then(|topic| index.infos.remove(&topic));
-    if let (Some(found), Some(topic)) = (&info, chosen.info)
-        && found.changes > 0
-    {
-        let name = &topics[topic].name;
-        warn(
-            vec![format!(
-                "topic {name}: the calibration changes {} times: the first is taken",
-                found.changes
-            )],
-            &mut damage,
-        );
+    let mut cameras = Vec::new();
+    for topic in chosen.color.into_iter().chain(chosen.cameras.iter().copied()) {
+        let images = match images(topic) {
+            Ok(Some(images)) => images,
+            Ok(None) => continue,
+            Err(e) if chosen.color.is_some() => return Err(e),
+            // One of several that nobody has asked for yet.
+            Err(e) => {
+                doubts.say(Suspicion::new(DAMAGED, "", e.to_string()));
+                continue;
+            }
+        };
+        let info = match chosen.color {
+            Some(_) => chosen.info,
+            None => chosen.info.filter(|_| settings.get("camera_info_topic").is_some()).or_else(|| {
+                let beside = info_beside(&images.topic);
+                topics
+                    .iter()
+                    .position(|t| t.name == beside && t.kind == "sensor_msgs/CameraInfo" && t.is_read())
+            }),
+        };
+        let found = info.and_then(|t| Some((topics[t].name.clone(), index.infos.get(&t)?.clone())));
+        let name = camera_name(&images.topic);
+        cameras.push(RosCamera { name, images, info: found });
     }
+    let depth = chosen.depth.map(&mut images).transpose()?.flatten();
+    name_apart(&mut cameras);
+    cameras.iter().for_each(|camera| doubts.say_all(camera.doubts()));
+    let color = cameras.first().filter(|_| chosen.color.is_some());
+    let depth_offset = depth_offset(&settings, color.map(|c| &c.images))?;
     let child = index.poses.values().map(|t| t.child.as_str()).find(|c| !c.is_empty());
-    let camera_frame =
-        color.as_ref().map(|c| c.frame.as_str()).or(info.as_ref().map(|i| i.info.frame.as_str()));
-    let frames = Frames::choose(&tf, &settings, camera_frame, child).map_err(|e| e.at(path))?;
-    if let (Some(depth), Some(camera)) = (&depth, camera_frame)
-        && depth.frame != camera
+    // Without images the calibration still names the frame.
+    let info_frame = chosen.info.and_then(|t| index.infos.get(&t)).map(|i| i.info.frame.clone());
+    let camera_frame = color.map(|c| c.images.frame.clone()).or(info_frame.filter(|_| cameras.is_empty()));
+    let frames = Frames::choose(&tf, &settings, camera_frame.as_deref(), child).map_err(|e| e.at(path))?;
+    if let (Some(depth), Some(camera)) = (&depth, &camera_frame)
+        && depth.frame != *camera
     {
-        let topic = &depth.topic;
-        warn(
-            vec![format!(
-                "topic {topic}: its frame is {}, the camera's is {camera}: is it registered?",
-                depth.frame
-            )],
-            &mut damage,
-        );
+        let message = format!("its frame is {}, the camera's is {camera}: is it registered?", depth.frame);
+        doubts.say(Suspicion::new("depth-frame", format!("topic {}", depth.topic), message));
     }
-    let poses: std::collections::BTreeMap<_, _> =
-        index.poses.into_iter().map(|(topic, poses)| (topics[topic].name.clone(), poses)).collect();
+    let mut poses: BTreeMap<String, PoseTopic> = BTreeMap::new();
+    for (topic, found) in index.poses {
+        let Topic { name, kind, .. } = &topics[topic];
+        if poses.contains_key(name) {
+            let message = format!("there are messages of several types: those of {kind} are left out");
+            doubts.say(Suspicion::new(TWO_SOURCES, format!("topic {name}"), message));
+        } else {
+            poses.insert(name.clone(), found);
+        }
+    }
+    poses.iter().for_each(|(name, topic)| doubts.say_all(topic.doubts(name)));
     let names: Vec<&str> = poses.keys().map(String::as_str).collect();
     let ground_truth = GroundTruth::choose(&settings, &names)?;
-    let camera = color.as_ref().map_or_else(|| "camera".to_string(), |c| camera_name(&c.topic));
     Ok(RosDataset {
         name: name_of(path),
         path: path.to_path_buf(),
@@ -114,21 +134,84 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> DataResult<RosDataset>
         chosen,
         frames,
         tf,
-        camera,
-        color,
+        cameras,
+        named: AtomicBool::new(false),
         depth,
         depth_offset,
-        info,
+        depth_unit,
         poses,
         ground_truth,
-        damage,
+        doubts,
         imu: OnceLock::new(),
     })
 }
 
-fn warn(lines: Vec<String>, damage: &mut Vec<String>) {
-    lines.iter().for_each(|line| tracing::warn!("{line}"));
-    damage.extend(lines);
+/// Damage of the files: the first places, and how many more there are.
+fn damage(mut places: Vec<String>) -> Vec<Suspicion> {
+    let more = if places.len() > SHOWN_PLACES + 1 { places.split_off(SHOWN_PLACES).len() } else { 0 };
+    let said = places.into_iter().map(|line| Suspicion::new(DAMAGED, "", line));
+    let rest = (more > 0).then(|| {
+        let message = format!("{more} more places of the recording are damaged in the same way or another");
+        Suspicion::new(DAMAGED, "", message).times(more as u64)
+    });
+    said.chain(rest).collect()
+}
+
+/// The tree of the robot that is meant, completed by what its description has.
+fn choose_tf(
+    recording: &Recording,
+    settings: &Settings,
+    topics: &[Topic],
+    index: &mut Index,
+    camera_topic: Option<&str>,
+    camera_frame: Option<&str>,
+    doubts: &Doubts,
+) -> DataResult<TfTree> {
+    let asked = Asked { set: settings.get("tf_namespace"), camera_topic, camera_frame };
+    let mut chosen = namespaces::choose(std::mem::take(&mut index.spaces), &asked)?;
+    doubts.say_all(chosen.doubt.take());
+    if chosen.undecided.is_none() {
+        let place = chosen.space.as_deref().or(camera_topic.map(namespaces::namespace)).unwrap_or_default();
+        complete::complete(recording, settings, topics, index, place, &mut chosen.tf, doubts)?;
+    }
+    let tf = chosen.finish();
+    doubts.say_all(tf.notes.iter().cloned());
+    match tf.roots() {
+        Ok(roots) if roots.len() > 1 => {
+            let trees: Vec<String> =
+                roots.iter().map(|(root, n)| format!("{root} (with {n} under it)")).collect();
+            let message = format!("tf has {} trees that are not connected: {}", roots.len(), list(&trees));
+            doubts.say(Suspicion::new("tf-trees", "", message));
+        }
+        Ok(_) => {}
+        Err(cycle) => doubts.say(Suspicion::new("tf-cycle", "", cycle.to_string())),
+    }
+    Ok(tf)
+}
+
+/// Topics that would be of use, were their messages in an encoding that is read.
+fn unread(topics: &[Topic]) -> Option<Suspicion> {
+    let others = topics.iter().filter(|t| t.encoding == Encoding::Other && t.count > 0);
+    let each: Vec<(String, u64)> =
+        others.map(|t| (format!("{} ({}, {})", t.name, t.kind, t.format), t.count)).collect();
+    let doubt = group(
+        "topic-not-read",
+        &each,
+        |topic, n| format!("{n} messages of {topic} are not read: neither ROS 1 nor CDR"),
+        "{all} messages of {n} topics are not read: neither ROS 1 nor CDR",
+    );
+    // What no robot sends for VICE is no loss.
+    doubt.filter(|_| topics.iter().any(|t| t.encoding == Encoding::Other && t.count > 0 && is_of_use(t)))
+}
+
+/// Cameras of the same short name go by their topics.
+fn name_apart(cameras: &mut [RosCamera]) {
+    let names: Vec<String> = cameras.iter().map(|c| c.name.clone()).collect();
+    for camera in cameras {
+        if names.iter().filter(|name| **name == camera.name).count() > 1 {
+            camera.name = camera.images.topic.clone();
+        }
+    }
 }
 
 /// The name of a file without its ending, or that of a folder.
@@ -149,124 +232,36 @@ fn not_a_recording(path: &Path) -> DataError {
     DataError::new(problem).at(path)
 }
 
+/// Whether a topic has images, transforms or poses, by its type.
+fn is_of_use(topic: &Topic) -> bool {
+    let known = ["/Image", "/CompressedImage", "/TFMessage", "/tfMessage", "/Odometry", "Stamped"];
+    known.iter().any(|k| topic.kind.ends_with(k))
+}
+
 /// Refuses a recording with nothing of use, with the reason that is nearest.
-fn check_use(topics: &[Topic], path: &Path, damage: &[String]) -> DataResult<()> {
-    let used = |t: &&Topic| {
-        let known = ["/Image", "/CompressedImage", "/TFMessage", "/tfMessage", "/Odometry", "Stamped"];
-        t.count > 0 && t.encoding != Encoding::Other && known.iter().any(|k| t.kind.ends_with(k))
-    };
-    if topics.iter().any(|t| used(&t)) {
+fn check_use(topics: &[Topic], path: &Path, doubts: &Doubts) -> DataResult<()> {
+    if topics.iter().any(|t| t.is_read() && is_of_use(t)) {
         return Ok(());
     }
     let names: Vec<String> = topics.iter().map(|t| format!("{} ({})", t.name, t.kind)).collect();
-    let problem = match topics.is_empty() {
-        true => "there are no messages".to_string(),
-        false => "no topic has images, transforms or poses".to_string(),
+    let mut unread: Vec<&str> =
+        topics.iter().filter(|t| t.encoding == Encoding::Other).map(|t| t.format.as_str()).collect();
+    unread.sort_unstable();
+    unread.dedup();
+    let problem = match (topics.is_empty(), unread.as_slice()) {
+        (true, _) => "there are no messages".to_string(),
+        (false, []) => "no topic has images, transforms or poses".to_string(),
+        (false, formats) => format!(
+            "no topic has images, transforms or poses that can be read: messages in {} are not",
+            list(formats)
+        ),
     };
-    let error = DataError::new(problem).at(path);
-    Err(match damage.first() {
-        Some(first) => error.because(first.clone()),
+    let error = DataError::of_kind(ErrorKind::Unsupported, problem).at(path);
+    Err(match doubts.damage().into_iter().next() {
+        Some(first) => error.because(DataError::new(first)),
         None if names.is_empty() => error,
-        None => error.hint(format!("its topics: {}", crate::tf::list(&names))),
+        None => error.hint(format!("its topics: {}", list(&names))),
     })
-}
-
-/// Adds the joints of a URDF that tf lacks, with their positions from `sensor_msgs/JointState` where they move.
-fn complete_tf(recording: &Recording, settings: &Settings, index: &mut Index) -> DataResult<()> {
-    let joints = match (settings.get("urdf"), &index.description) {
-        (Some(name), _) => {
-            let path = settings.path(name);
-            let text = std::fs::read_to_string(&path)
-                .map_err(|e| DataError::new("cannot be read").at(&path).because(e))?;
-            urdf::parse(&text).map_err(|e| e.at(&path))?
-        }
-        (None, Some(text)) => match urdf::parse(text) {
-            Ok(joints) => joints,
-            Err(e) => {
-                tracing::warn!("the robot description is left aside: {e}");
-                return Ok(());
-            }
-        },
-        (None, None) => return Ok(()),
-    };
-    let missing: Vec<urdf::Joint> = joints.into_iter().filter(|j| !index.tf.has(&j.child)).collect();
-    let mut moving = false;
-    for joint in &missing {
-        match joint.fixed() {
-            Some(fixed) => index.tf.fix(&joint.parent, &joint.child, fixed),
-            None => moving = true,
-        }
-    }
-    if moving {
-        add_joint_states(recording, settings.stamps()?, &missing, &mut index.tf)?;
-    }
-    Ok(())
-}
-
-fn add_joint_states(
-    recording: &Recording,
-    stamps: Stamps,
-    joints: &[urdf::Joint],
-    tf: &mut TfBuilder,
-) -> DataResult<()> {
-    let mut broken = 0_u64;
-    let mut pass = Only {
-        wanted: |topic: &Topic| topic.kind == "sensor_msgs/JointState",
-        each: |message: &crate::container::Message<'_>| {
-            let mut positions = Vec::new();
-            let read = Reader::new(message.bytes, message.encoding)
-                .and_then(|mut r| joint_state(&mut r, |name, position| positions.push((name, position))));
-            let Ok(header) = read else {
-                broken += 1;
-                return;
-            };
-            let stamp = if stamps == Stamps::Record { message.recorded } else { header.stamp };
-            for (name, position) in positions {
-                for joint in joints.iter().filter(|j| j.driver() == name) {
-                    if let Some(transform) = joint.at(position) {
-                        tf.sample(&joint.parent, &joint.child, stamp, transform);
-                    }
-                }
-            }
-        },
-    };
-    recording.scan(&mut pass)?;
-    if broken > 0 {
-        tracing::warn!("{broken} messages of sensor_msgs/JointState cannot be decoded: left out");
-    }
-    Ok(())
-}
-
-/// The frames of a topic, sorted in time.
-fn frames_of(
-    recording: &Recording,
-    topic: &Topic,
-    found: ImageTopic,
-    damage: &mut Vec<String>,
-) -> DataResult<Images> {
-    let ImageTopic { packing, mut frames, frame, encoding, unstamped, jump } = found;
-    let name = &topic.name;
-    if let Some((before, after, locator)) = jump {
-        let problem = format!("topic {name}: the clock jumps back from {before} ns to {after} ns");
-        return Err(recording.place(&locator, DataError::new(problem).hint("cut the recording at the jump")));
-    }
-    if frames.is_empty() {
-        return Err(DataError::new(format!("topic {name}: all {unstamped} stamps are zero")).hint(
-            "a robot on simulated time without a clock; `set` stamps=record takes the time of recording",
-        ));
-    }
-    if unstamped > 0 {
-        warn(vec![format!("topic {name}: {unstamped} images with a zero stamp are left out")], damage);
-    }
-    frames.sort_by_key(|(stamp, _)| *stamp);
-    let n = frames.len();
-    frames.dedup_by_key(|(stamp, _)| *stamp);
-    if frames.len() < n {
-        let again = n - frames.len();
-        warn(vec![format!("topic {name}: {again} images repeat a stamp: the first of each is kept")], damage);
-    }
-    let (stamps, locators): (Vec<Stamp>, Vec<_>) = frames.into_iter().unzip();
-    Ok(Images { topic: name.clone(), packing, frame, encoding, stamps: Arc::from(stamps), locators })
 }
 
 /// How far a depth image may be from its frame: half a frame period, or what is set.

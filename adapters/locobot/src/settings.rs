@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use vice_core::dataset::{OpenOptions, SettingInfo};
-use vice_core::error::{DataError, DataResult};
+use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::frames::Rigid;
 
+use crate::pixels::DepthUnit;
 use crate::tf::Transform;
 
 /// The file of settings beside a recording.
@@ -15,7 +16,7 @@ const FILE: &str = "vice.toml";
 const TABLE: &str = "locobot";
 
 /// Keys and what they do.
-const KEYS: [(&str, &str); 15] = [
+const KEYS: [(&str, &str); 17] = [
     ("color_topic", "image topic of the camera (default /camera/color/image_raw, else found by type)"),
     ("depth_topic", "depth image registered to it (default /camera/aligned_depth_to_color/image_raw)"),
     ("camera_info_topic", "its calibration (default: camera_info beside the image topic)"),
@@ -27,6 +28,11 @@ const KEYS: [(&str, &str); 15] = [
     (
         "ground_truth_frame",
         "tf frame whose poses the ground truth gives (default: as the topic says, else the base)",
+    ),
+    ("tf_namespace", "robot whose tf is used, such as /robot1 (default: that of the camera's topic)"),
+    (
+        "depth_unit",
+        "`m`, `cm`, `mm` or metres a count: what the numbers of the depth images are (default: mm in 16UC1, m in 32FC1)",
     ),
     ("map_frame", "world frame of the stream `slam` (default map)"),
     ("odom_frame", "world frame of the stream `odom` (default odom)"),
@@ -109,6 +115,16 @@ impl Settings {
                 Err(DataError::new(format!("stamps = {other}")).hint("it is `header` or `record`"))
             }
         }
+    }
+
+    /// What the numbers of the depth images are, where it is set.
+    pub(crate) fn depth_unit(&self) -> DataResult<Option<DepthUnit>> {
+        let Some(text) = self.get("depth_unit") else { return Ok(None) };
+        let unit = DepthUnit::parse(text).map(Some);
+        unit.ok_or_else(|| {
+            DataError::of_kind(ErrorKind::Usage, format!("depth_unit = {text}"))
+                .hint("it is m, cm, mm, or how many metres a count is, such as 0.00025")
+        })
     }
 
     /// The fixed place of the camera, where it is set.

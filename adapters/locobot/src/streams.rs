@@ -2,13 +2,16 @@
 
 use vice_core::dataset::GROUND_TRUTH;
 use vice_core::error::{DataError, DataResult};
+use vice_core::suspicion::Suspicion;
 use vice_core::time::Stamp;
 use vice_core::trajectory::Trajectory;
 
 use crate::choose::Frames;
-use crate::index::PoseTopic;
+use crate::doubts::{Doubts, REPEATED};
+use crate::series::PoseTopic;
 use crate::settings::Settings;
-use crate::tf::{CLOCK_JUMP, Chain, TfTree, Transform};
+use crate::tf::{CLOCK_JUMP, Chain, TfTree, Transform, clock_jump};
+use crate::to_and_fro;
 
 /// The stream of the wheel encoders, `odom -> base` of tf.
 pub(crate) const ODOM: &str = "odom";
@@ -48,6 +51,7 @@ impl GroundTruth {
 
 /// The way of a stream of tf: from the base to the world frame.
 pub(crate) fn tf_chain<'a>(tf: &'a TfTree, frames: &'a Frames, stream: &str) -> DataResult<Chain<'a>> {
+    tf.decided()?;
     let (key, world) = if stream == ODOM { ("odom_frame", &frames.odom) } else { ("map_frame", &frames.map) };
     let (Some(world), Some(base)) = (world, &frames.base) else {
         let (key, missing) = if world.is_none() { (key, "world frame") } else { ("base_frame", "base") };
@@ -90,27 +94,35 @@ pub(crate) fn topic_trajectory(
     child: &str,
     tf: &TfTree,
     base: Option<&str>,
+    doubts: &Doubts,
 ) -> DataResult<Trajectory> {
-    for w in topic.poses.windows(2) {
-        let (before, after) = (w[0].0, w[1].0);
-        if before.since(after) >= CLOCK_JUMP {
-            let problem = format!("topic {name}: the clock jumps back from {before} ns to {after} ns");
-            return Err(DataError::new(problem).hint("cut the recording at the jump"));
-        }
+    let about = format!("topic {name}");
+    let back = topic.poses.windows(2).map(|w| (w[0].0, w[1].0));
+    let mut back = back.filter(|(before, after)| before.since(*after) >= CLOCK_JUMP);
+    if let Some(jump) = back.next() {
+        return Err(clock_jump(&format!("{about}: the clock"), jump, 1 + back.count() as u64));
     }
     let mut rows = topic.poses.clone();
-    // Of two for the same stamp the later message counts.
     rows.sort_by_key(|(stamp, _)| *stamp);
-    rows.reverse();
+    doubts.say_all(to_and_fro::doubt(&about, &rows.iter().map(|row| row.1).collect::<Vec<_>>()));
+    // The first of several for the same stamp counts, as in files.
+    let n = rows.len();
     rows.dedup_by_key(|(stamp, _)| *stamp);
-    rows.reverse();
+    if rows.len() < n {
+        let again = (n - rows.len()) as u64;
+        let message = format!("{again} poses repeat a stamp: the first of each is kept");
+        doubts.say(Suspicion::new(REPEATED, about.as_str(), message).times(again));
+    }
     let chain = base.filter(|base| !child.is_empty() && *base != child).map(|base| tf.chain(child, base));
     let in_base = |(stamp, pose): (Stamp, Transform)| match &chain {
         Some(Ok(chain)) => chain.at(stamp).ok().map(|child_from_base| (stamp, pose * child_from_base)),
         _ => Some((stamp, pose)),
     };
     if let Some(Err(e)) = &chain {
-        tracing::warn!("stream {name} gives poses of {child}, taken as those of the body, since {e}");
+        let message = format!("it gives poses of {child}, taken as those of the body, since {e}");
+        doubts.say(
+            Suspicion::new("body-not-known", format!("stream {name}"), message).advice("set base_frame"),
+        );
     }
     let poses = rows.into_iter().filter_map(in_base).map(|(stamp, pose)| (stamp, pose.reinterpret()));
     Trajectory::from_poses(poses.collect::<Vec<_>>()).map_err(|e| {

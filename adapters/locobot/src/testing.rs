@@ -129,6 +129,37 @@ pub(crate) fn camera_info(topic: &str, nanos: i64, frame: &str) -> Msg {
     })
 }
 
+/// What a test changes of a `sensor_msgs/CameraInfo` of 4x2 pixels with a focal length of 100.
+#[derive(Clone, Debug)]
+pub(crate) struct Info<'a> {
+    pub(crate) size: [u32; 2],
+    pub(crate) model: &'a str,
+    pub(crate) distortion: &'a [f64],
+    pub(crate) focal: f64,
+    pub(crate) binning: u32,
+}
+
+impl Default for Info<'_> {
+    fn default() -> Self {
+        Self { size: [4, 2], model: "plumb_bob", distortion: &[0.0; 5], focal: 100.0, binning: 0 }
+    }
+}
+
+pub(crate) fn camera_info_of(topic: &str, nanos: i64, frame: &str, info: &Info<'_>) -> Msg {
+    let Info { size: [width, height], model, distortion, focal, binning } = *info;
+    Msg::new(topic, "sensor_msgs/CameraInfo", nanos, |o| {
+        let o = o.header(nanos, frame).u32(height).u32(width).str(model).list(distortion);
+        let o = o.f64s(&[focal, 0.0, 1.5, 0.0, focal, 0.5, 0.0, 0.0, 1.0]).f64s(&[0.0; 9]);
+        let o = o.f64s(&[focal, 0.0, 1.5, 0.0, 0.0, focal, 0.5, 0.0, 0.0, 0.0, 1.0, 0.0]);
+        o.u32(binning).u32(binning).u32(0).u32(0).u32(0).u32(0).u8(0)
+    })
+}
+
+/// A compressed image of a format that `format` names.
+pub(crate) fn compressed_image(topic: &str, nanos: i64, frame: &str, format: &str, data: &[u8]) -> Msg {
+    Msg::new(topic, "sensor_msgs/CompressedImage", nanos, |o| o.header(nanos, frame).str(format).data(data))
+}
+
 /// A 4x2 image whose bytes are all `value`.
 pub(crate) fn image(topic: &str, nanos: i64, frame: &str, encoding: &str, value: u8) -> Msg {
     let step = if encoding == "mono8" { 4 } else { 8 };
@@ -236,9 +267,11 @@ pub(crate) fn mcap(messages: &[Msg]) -> Vec<u8> {
     let options = mcap::WriteOptions::new().compression(None).chunk_size(Some(600));
     let mut writer = options.create(std::io::Cursor::new(Vec::new())).unwrap();
     for (sequence, message) in (0..).zip(messages) {
+        // A topic may say its own encoding, `json:/topic`.
+        let (encoding, topic) = message.topic.split_once(':').unwrap_or(("cdr", &message.topic));
         let kind = message.kind.replace('/', "/msg/");
         let schema = writer.add_schema(&kind, "ros2msg", b"").unwrap();
-        let channel = writer.add_channel(schema, &message.topic, "cdr", &Default::default()).unwrap();
+        let channel = writer.add_channel(schema, topic, encoding, &Default::default()).unwrap();
         let time = message.nanos as u64;
         let header = mcap::records::MessageHeader {
             channel_id: channel,
@@ -255,23 +288,29 @@ pub(crate) fn mcap(messages: &[Msg]) -> Vec<u8> {
 /// A data base of rosbag2; each message compressed where asked for.
 pub(crate) fn db3(path: &Path, messages: &[Msg], compressed: bool) {
     let connection = rusqlite::Connection::open(path).unwrap();
+    fill_db3(&connection, messages, compressed);
+}
+
+/// Adds messages to a data base, which may be empty.
+pub(crate) fn fill_db3(connection: &rusqlite::Connection, messages: &[Msg], compressed: bool) {
     connection
         .execute_batch(
-            "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,
+            "CREATE TABLE IF NOT EXISTS topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,
              serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);
-             CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL,
+             CREATE TABLE IF NOT EXISTS messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL,
              data BLOB NOT NULL);",
         )
         .unwrap();
+    let before: i64 = connection.query_row("SELECT count(*) FROM topics", [], |row| row.get(0)).unwrap();
     let mut topics: Vec<&str> = Vec::new();
     for message in messages {
         if !topics.contains(&message.topic.as_str()) {
             topics.push(&message.topic);
             let kind = message.kind.replace('/', "/msg/");
-            let row = (topics.len() as i64, &message.topic, kind);
+            let row = (before + topics.len() as i64, &message.topic, kind);
             connection.execute("INSERT INTO topics VALUES (?1, ?2, ?3, 'cdr', '')", row).unwrap();
         }
-        let topic = 1 + topics.iter().position(|t| *t == message.topic).unwrap() as i64;
+        let topic = before + 1 + topics.iter().position(|t| *t == message.topic).unwrap() as i64;
         let plain = &message.bytes[1];
         let data = if compressed { zstd::bulk::compress(plain, 1).unwrap() } else { plain.clone() };
         let row = (topic, message.nanos, data);

@@ -1,5 +1,10 @@
 //! Recordings as data sets: another robot's layout, and what can be wrong with one.
 
+mod cameras;
+mod crash;
+mod lenient;
+mod robots;
+
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
@@ -51,6 +56,11 @@ fn at(nanos: i64) -> Stamp {
 
 fn facts(data: &dyn Dataset) -> String {
     data.facts().iter().map(|f| format!("{}: {}\n", f.section, f.text)).collect()
+}
+
+/// What the data set doubts, one line each.
+fn doubts(data: &dyn Dataset) -> String {
+    data.suspicions().iter().map(|s| format!("{}: {}\n", s.code, s.line())).collect()
 }
 
 fn without(topic: &str) -> Vec<Msg> {

@@ -4,12 +4,17 @@
 //! [`MAX_EDGE_GAP`] apart), and only then are the edges of a chain multiplied: `map -> odom` at 5 Hz and
 //! `odom -> base` at 50 Hz cannot be interpolated as one.
 
-use std::collections::{BTreeMap, BTreeSet};
+mod build;
 
-use vice_core::error::{DataError, DataResult};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::frames::Rigid;
+use vice_core::suspicion::Suspicion;
 use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::{NoPose, Trajectory};
+
+pub(crate) use build::TfBuilder;
 
 /// A frame of the tree.
 #[derive(Clone, Copy, Debug)]
@@ -23,117 +28,6 @@ pub(crate) const MAX_EDGE_GAP: Span = Span::from_millis(1000);
 /// A stamp this much earlier than the one before is a jump of the clock, not a message that came late.
 pub(crate) const CLOCK_JUMP: Span = Span::from_millis(1000);
 
-/// An edge while the tree is being built.
-#[derive(Debug)]
-struct Growing {
-    parent: String,
-    fixed: Option<Transform>,
-    samples: Vec<(Stamp, Transform)>,
-    jump: Option<(Stamp, Stamp)>,
-}
-
-/// Collects edges as they come.
-#[derive(Debug, Default)]
-pub(crate) struct TfBuilder {
-    edges: BTreeMap<String, Growing>,
-    /// Oddities, each once.
-    notes: BTreeSet<String>,
-    unstamped: BTreeMap<String, u64>,
-}
-
-impl TfBuilder {
-    fn edge(&mut self, parent: &str, child: &str) -> Option<&mut Growing> {
-        if parent.is_empty() || child.is_empty() || parent == child {
-            self.notes.insert(format!("tf has an edge from `{parent}` to `{child}`: left out"));
-            return None;
-        }
-        // The look-up by &str first: names are copied for the first transform of an edge only.
-        if !self.edges.contains_key(child) {
-            let growing =
-                Growing { parent: parent.to_string(), fixed: None, samples: Vec::new(), jump: None };
-            self.edges.insert(child.to_string(), growing);
-        }
-        let edge = self.edges.get_mut(child)?;
-        if edge.parent != parent {
-            self.notes.insert(format!(
-                "frame {child} has two parents in tf, {} and {parent}: the first is kept",
-                edge.parent
-            ));
-            return None;
-        }
-        Some(edge)
-    }
-
-    /// Adds an edge that holds at all times.
-    pub(crate) fn fix(&mut self, parent: &str, child: &str, parent_from_child: Transform) {
-        let Some(edge) = self.edge(parent, child) else { return };
-        let changed = edge.fixed.is_some_and(|before| before != parent_from_child);
-        edge.fixed = Some(parent_from_child);
-        if changed {
-            self.notes.insert(format!("the fixed transform {parent} -> {child} changes: the last is taken"));
-        }
-    }
-
-    /// Adds a sample of a moving edge.
-    pub(crate) fn sample(&mut self, parent: &str, child: &str, stamp: Stamp, parent_from_child: Transform) {
-        if stamp.as_nanos() == 0 {
-            *self.unstamped.entry(format!("{parent} -> {child}")).or_default() += 1;
-            return;
-        }
-        let Some(edge) = self.edge(parent, child) else { return };
-        if let Some(&(last, _)) = edge.samples.last()
-            && last.since(stamp) >= CLOCK_JUMP
-            && edge.jump.is_none()
-        {
-            edge.jump = Some((last, stamp));
-        }
-        edge.samples.push((stamp, parent_from_child));
-    }
-
-    /// Whether a frame hangs on another one.
-    pub(crate) fn has(&self, child: &str) -> bool {
-        self.edges.contains_key(child)
-    }
-
-    /// The tree, its edges sorted in time.
-    pub(crate) fn finish(self) -> TfTree {
-        let mut notes: Vec<String> = self.notes.into_iter().collect();
-        for (edge, n) in self.unstamped {
-            notes.push(format!("{n} transforms {edge} have a zero stamp: left out"));
-        }
-        let mut edges = BTreeMap::new();
-        for (child, growing) in self.edges {
-            let Growing { parent, fixed, mut samples, jump } = growing;
-            if fixed.is_some() && !samples.is_empty() {
-                notes.push(format!("{parent} -> {child} is both fixed and moving in tf: taken as fixed"));
-            }
-            let motion = match (fixed, jump) {
-                (Some(fixed), _) => Motion::Fixed(fixed),
-                (None, Some((before, after))) => Motion::Jump { before, after },
-                (None, None) => {
-                    samples.sort_by_key(|(stamp, _)| *stamp);
-                    let n = samples.len();
-                    // Of two for the same stamp the later message counts, as it does in ROS.
-                    samples.reverse();
-                    samples.dedup_by_key(|(stamp, _)| *stamp);
-                    samples.reverse();
-                    if samples.len() < n {
-                        let again = n - samples.len();
-                        notes.push(format!("{again} transforms {parent} -> {child} repeat a stamp"));
-                    }
-                    let poses = samples.into_iter().map(|(stamp, t)| (stamp, t.reinterpret()));
-                    match Trajectory::from_poses(poses) {
-                        Ok(trajectory) => Motion::Moving(trajectory),
-                        Err(_) => continue, // Nothing but zero stamps, which was noted.
-                    }
-                }
-            };
-            edges.insert(child, Edge { parent, motion });
-        }
-        TfTree { edges, notes }
-    }
-}
-
 #[derive(Clone, Debug)]
 enum Motion {
     Fixed(Transform),
@@ -142,6 +36,7 @@ enum Motion {
     Jump {
         before: Stamp,
         after: Stamp,
+        times: u64,
     },
 }
 
@@ -155,8 +50,10 @@ struct Edge {
 #[derive(Clone, Debug)]
 pub(crate) struct TfTree {
     edges: BTreeMap<String, Edge>,
-    /// Oddities that were met while it was built.
-    pub(crate) notes: Vec<String>,
+    /// Oddities that were met while it was built, each kind once.
+    pub(crate) notes: Vec<Suspicion>,
+    /// Why no tf is used, where it comes from several robots and nothing says which is meant.
+    pub(crate) undecided: Option<String>,
 }
 
 /// The way from one frame to another: `target_from_source` as a product of edges.
@@ -189,18 +86,69 @@ impl TfTree {
         }
     }
 
+    /// All frames of a name behind a prefix.
+    pub(crate) fn behind_prefixes(&self, name: &str) -> Vec<&str> {
+        let behind = format!("/{name}");
+        self.frames().into_iter().filter(|frame| frame.ends_with(&behind)).collect()
+    }
+
+    /// As [`TfTree::find`]; where several prefixes fit, the one that is `near`'s too, as of one robot of many.
+    pub(crate) fn find_near(&self, name: &str, near: Option<&str>) -> Option<String> {
+        self.find(name).or_else(|| {
+            let mut prefix = near?;
+            while let Some((outer, _)) = prefix.rsplit_once('/') {
+                let own = format!("{outer}/{name}");
+                if self.frames().contains(&own.as_str()) {
+                    return Some(own);
+                }
+                prefix = outer;
+            }
+            None
+        })
+    }
+
     /// The edges from a frame up to its root, the nearest first, and the root.
     fn ancestors<'a>(&'a self, frame: &'a str) -> DataResult<(Vec<(&'a str, &'a Edge)>, &'a str)> {
         let (mut up, mut at) = (Vec::new(), frame);
         while let Some((child, edge)) = self.edges.get_key_value(at) {
-            if up.iter().any(|(seen, _)| *seen == child.as_str()) {
-                let cycle: Vec<&str> = up.iter().map(|(c, _)| *c).skip_while(|c| *c != child).collect();
-                return Err(DataError::new(format!("tf has a cycle: {} -> {child}", cycle.join(" -> "))));
+            // As many steps as there are edges only a cycle makes.
+            if up.len() >= self.edges.len() {
+                return Err(self.cycle(child));
             }
             up.push((child.as_str(), edge));
             at = &edge.parent;
         }
         Ok((up, at))
+    }
+
+    /// The error of a cycle, from a frame that leads into it.
+    fn cycle(&self, frame: &str) -> DataError {
+        let up = |at: &str| self.edges.get(at).map_or_else(String::new, |edge| edge.parent.clone());
+        let mut inside = frame.to_string();
+        (0..self.edges.len()).for_each(|_| inside = up(&inside));
+        // The frame that comes first by name, so that it is the same from wherever it was met.
+        let mut frames = vec![inside.clone()];
+        let mut at = up(&inside);
+        while at != inside {
+            frames.push(at.clone());
+            at = up(&at);
+        }
+        let first = frames.iter().enumerate().min_by_key(|(_, name)| name.as_str()).map_or(0, |(i, _)| i);
+        frames.rotate_left(first);
+        frames.push(frames[0].clone());
+        let shown = match frames.len() {
+            n if n > 12 => format!("{} -> ... ({} frames)", frames[..6].join(" -> "), n - 1),
+            _ => frames.join(" -> "),
+        };
+        DataError::new(format!("tf has a cycle: {shown}"))
+    }
+
+    /// Refuses where tf comes from several robots and nothing says which is meant.
+    pub(crate) fn decided(&self) -> DataResult<()> {
+        let error = |why: &String| {
+            DataError::of_kind(ErrorKind::Contradictory, why.as_str()).hint("set tf_namespace")
+        };
+        self.undecided.as_ref().map_or(Ok(()), |why| Err(error(why)))
     }
 
     /// The way from `source` to `target`.
@@ -209,6 +157,7 @@ impl TfTree {
     /// [`DataError`] that names the frames of a cycle, the frame that tf does not know, or the two roots that are not
     /// connected.
     pub(crate) fn chain<'a>(&'a self, target: &'a str, source: &'a str) -> DataResult<Chain<'a>> {
+        self.decided()?;
         let (mut to_target, target_root) = self.ancestors(target)?;
         let (mut to_source, source_root) = self.ancestors(source)?;
         if target_root != source_root {
@@ -236,12 +185,26 @@ impl TfTree {
 
     /// The frames on which nothing else hangs above, with the number of frames under each; sorted.
     pub(crate) fn roots(&self) -> DataResult<Vec<(String, usize)>> {
-        let mut roots: BTreeMap<String, usize> = BTreeMap::new();
+        let mut roots: BTreeMap<&str, usize> = BTreeMap::new();
+        // The roots of frames that were met on the way up, so that each edge is gone up once.
+        let mut known: HashMap<&str, &str> = HashMap::new();
         for frame in self.edges.keys() {
-            let (_, root) = self.ancestors(frame)?;
-            *roots.entry(root.to_string()).or_default() += 1;
+            let (mut way, mut at): (Vec<&str>, &str) = (Vec::new(), frame);
+            let root = loop {
+                if let Some(root) = known.get(at) {
+                    break *root;
+                }
+                let Some(edge) = self.edges.get(at) else { break at };
+                if way.len() >= self.edges.len() {
+                    return Err(self.cycle(at));
+                }
+                way.push(at);
+                at = &edge.parent;
+            };
+            known.extend(way.into_iter().map(|frame| (frame, root)));
+            *roots.entry(root).or_default() += 1;
         }
-        Ok(roots.into_iter().collect())
+        Ok(roots.into_iter().map(|(root, n)| (root.to_string(), n)).collect())
     }
 
     /// One line an edge: frames, fixed or moving, rate.
@@ -328,11 +291,20 @@ impl Edge {
     }
 
     fn jump(&self, child: &str) -> Option<DataError> {
-        let Motion::Jump { before, after } = &self.motion else { return None };
+        let Motion::Jump { before, after, times } = &self.motion else { return None };
         let parent = &self.parent;
-        let problem =
-            format!("the clock of tf {parent} -> {child} jumps back from {before} ns to {after} ns");
-        Some(DataError::new(problem).hint("cut the recording at the jump"))
+        Some(clock_jump(&format!("the clock of tf {parent} -> {child}"), (*before, *after), *times))
+    }
+}
+
+/// The error of a series whose clock jumps back, and how often it does.
+pub(crate) fn clock_jump(what: &str, (before, after): (Stamp, Stamp), times: u64) -> DataError {
+    let problem = format!("{what} jumps back from {before} ns to {after} ns");
+    match times {
+        0 | 1 => DataError::new(problem).hint("cut the recording at the jump"),
+        // One jump is a clock that was set, many are two clocks.
+        _ => DataError::new(format!("{problem}, and {} times more", times - 1))
+            .hint("two sources with clocks of their own seem to publish it: record only one of them"),
     }
 }
 

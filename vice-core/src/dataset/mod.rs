@@ -5,6 +5,7 @@
 //! frames are stamps, pixels come one image at a time.
 
 mod calibrated;
+mod depth_unit;
 mod image;
 mod plane;
 
@@ -15,6 +16,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 
 pub use calibrated::Calibrated;
+pub use depth_unit::depth_unit_doubt;
 pub use image::{DepthImage, Image, PixelFormat};
 pub use plane::{Floor, Plane};
 

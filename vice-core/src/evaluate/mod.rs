@@ -242,7 +242,12 @@ fn run(
         pixel,
         trajectory,
         paths,
-        suspicions: evaluation.dataset.suspicions().into_iter().collect(),
+        suspicions: evaluation
+            .dataset
+            .suspicions()
+            .into_iter()
+            .chain(evaluation.depths.iter().flat_map(|source| source.suspicions()))
+            .collect(),
     })
 }
 

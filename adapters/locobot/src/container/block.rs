@@ -12,6 +12,9 @@ use super::{Locator, Payload, Scan, Visitor};
 
 /// Bytes beyond which a block is refused: recorders write blocks of about a megabyte, or of one message.
 const MAX_BLOCK_BYTES: u64 = 1 << 30;
+/// Bytes from which on a block must not unpack to more than [`MOST_TIMES`] its size: no robot sees that much of nothing.
+const LARGE_BYTES: u64 = 16 << 20;
+const MOST_TIMES: u64 = 1000;
 /// Bytes reserved on the word of a header, before any data is seen.
 const TRUSTED_BYTES: u64 = 64 << 20;
 /// Blocks kept: a step forward needs those of the colour and the depth image, and their successors.
@@ -202,9 +205,10 @@ pub(super) struct BlockFile {
 }
 
 impl BlockFile {
-    pub(super) fn open(path: &Path) -> DataResult<Arc<Self>> {
+    /// Opens the file at `place`; `path` is the one that the user knows.
+    pub(super) fn open(path: &Path, place: &Path) -> DataResult<Arc<Self>> {
         let failed = |e: std::io::Error| DataError::new("cannot be read").at(path).because(e);
-        let file = File::open(path).map_err(failed)?;
+        let file = File::open(place).map_err(failed)?;
         let len = file.metadata().map_err(failed)?.len();
         Ok(Arc::new(Self { file: Mutex::new(file), len, cache: Mutex::default(), spare: Mutex::default() }))
     }
@@ -244,6 +248,10 @@ impl BlockFile {
         out.clear();
         if block.stored > MAX_BLOCK_BYTES {
             return Some(format!("has {} bytes, too many to be read", block.stored));
+        }
+        if block.size > LARGE_BYTES && block.size / block.stored.max(1) > MOST_TIMES {
+            let (size, stored) = (block.size, block.stored);
+            return Some(format!("claims {size} bytes in {stored}, more than {MOST_TIMES} times as many"));
         }
         let stored = match self.read_vec(block.offset, block.stored) {
             Ok(stored) => stored,

@@ -12,9 +12,8 @@ use rusqlite::{Connection, OpenFlags};
 use vice_core::error::{DataError, DataResult};
 use vice_core::time::Stamp;
 
-use super::{
-    Container, Encoding, HEAD_BYTES, Locator, MAX_MESSAGE_BYTES, Message, Payload, Scan, Visitor, Want,
-};
+use super::unpack::log_of;
+use super::{Container, HEAD_BYTES, Locator, MAX_MESSAGE_BYTES, Message, Payload, Scan, Visitor, Want};
 
 /// What a data base starts with.
 pub(super) const MAGIC: &[u8] = b"SQLite format 3\0";
@@ -32,17 +31,20 @@ pub(super) struct Db3 {
 /// Whether a data base has the tables of rosbag2.
 pub(super) fn is_rosbag2(path: &Path) -> bool {
     let tables = "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('topics', 'messages')";
-    connect(path).and_then(|c| c.query_row(tables, [], |r| r.get::<_, i64>(0))).is_ok_and(|n| n == 2)
+    connect(path, false).and_then(|c| c.query_row(tables, [], |r| r.get::<_, i64>(0))).is_ok_and(|n| n == 2)
 }
 
-fn connect(path: &Path) -> rusqlite::Result<Connection> {
+/// Connects to a data base; one that is a `copy` of ours may be written to, so that sqlite can merge its log.
+fn connect(path: &Path, copy: bool) -> rusqlite::Result<Connection> {
     // Of the path in an URI only what would end or escape it matters.
     let text = path.to_string_lossy().replace('%', "%25").replace('?', "%3f").replace('#', "%23");
-    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY
+    let access = if copy { OpenFlags::SQLITE_OPEN_READ_WRITE } else { OpenFlags::SQLITE_OPEN_READ_ONLY };
+    let flags = access
         | OpenFlags::SQLITE_OPEN_URI
         | OpenFlags::SQLITE_OPEN_NO_MUTEX
         | OpenFlags::SQLITE_OPEN_EXRESCODE;
-    let connection = Connection::open_with_flags(format!("file:{text}?immutable=1"), flags)?;
+    let immutable = if copy { "" } else { "?immutable=1" };
+    let connection = Connection::open_with_flags(format!("file:{text}{immutable}"), flags)?;
     // Nothing can be written through this connection. What this allows is to read a file that is shorter than its
     // header says, which sqlite would refuse as a whole.
     connection.execute_batch("PRAGMA writable_schema = ON")?;
@@ -55,9 +57,17 @@ fn failed(what: impl Into<String>) -> impl FnOnce(rusqlite::Error) -> DataError 
 }
 
 impl Db3 {
-    pub(super) fn open(path: &Path, compressed: bool) -> DataResult<Self> {
-        let connection = connect(path).map_err(|e| failed("the data base cannot be opened")(e).at(path))?;
-        let len = path.metadata().map_or(0, |m| m.len());
+    /// Opens the data base at `place`, which is a `copy` where that of the user at `path` could not be read as it is.
+    pub(super) fn open(path: &Path, place: &Path, compressed: bool, copy: bool) -> DataResult<Self> {
+        let connection =
+            connect(place, copy).map_err(|e| failed("the data base cannot be opened")(e).at(path))?;
+        // Without its description the messages still say that they are compressed: CDR never starts like this.
+        let first = "SELECT hex(substr(data, 1, 4)) FROM messages ORDER BY id LIMIT 1";
+        let first = connection.query_row(first, [], |row| row.get::<_, String>(0));
+        let compressed = compressed || first.is_ok_and(|head| head == "28B52FFD");
+        // A message that is still in the log has its bytes there.
+        let files = [place.to_path_buf(), log_of(place)];
+        let len = files.iter().filter_map(|p| p.metadata().ok()).map(|m| m.len()).sum();
         Ok(Self { path: path.to_path_buf(), connection: Mutex::new(connection), compressed, len })
     }
 
@@ -74,7 +84,7 @@ impl Db3 {
         let mut topics = BTreeMap::new();
         while let Some(row) = rows.next()? {
             let (name, kind, format): (String, String, String) = (row.get(1)?, row.get(2)?, row.get(3)?);
-            topics.insert(row.get(0)?, scan.topic(&name, &kind, Encoding::from_name(&format), visitor));
+            topics.insert(row.get(0)?, scan.topic(&name, &kind, &format, visitor));
         }
         Ok(topics)
     }
@@ -153,13 +163,6 @@ impl Db3 {
 
 impl Container for Db3 {
     fn scan(&self, file: u32, scan: &mut Scan, visitor: &mut dyn Visitor) -> DataResult<()> {
-        let log = PathBuf::from(format!("{}-wal", self.path.display()));
-        if log.metadata().is_ok_and(|m| m.len() > 0) {
-            let problem = "messages that sqlite had not merged into the data base are not read";
-            scan.damaged(
-                &DataError::new(problem).at(&log).hint("open a copy once with sqlite3 to merge them"),
-            );
-        }
         let topics = self.topics(scan, visitor).map_err(|e| {
             failed("is no data base of rosbag2")(e).hint("it needs the tables topics and messages")
         })?;

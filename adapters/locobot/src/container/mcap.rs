@@ -9,9 +9,8 @@ use vice_core::error::{DataError, DataResult};
 use vice_core::time::Stamp;
 
 use super::block::{Block, BlockFile, Compression, Records, Source, State};
-use super::{
-    Container, Encoding, HEAD_BYTES, Locator, MAX_MESSAGE_BYTES, Message, Payload, Scan, Visitor, Want,
-};
+use super::unpack;
+use super::{Container, HEAD_BYTES, Locator, MAX_MESSAGE_BYTES, Message, Payload, Scan, Visitor, Want};
 
 /// What an MCAP file starts and ends with.
 pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
@@ -31,8 +30,10 @@ pub(super) struct Mcap {
 }
 
 /// Finds the chunks of a file; messages outside of chunks are taken as chunks without compression.
-pub(super) fn open(path: &Path) -> DataResult<Mcap> {
-    let file = BlockFile::open(path)?;
+///
+/// The file lies at `place` where it had to be unpacked.
+pub(super) fn open(path: &Path, place: &Path) -> DataResult<Mcap> {
+    let file = BlockFile::open(path, place)?;
     let mut source = file.window();
     if source.get(0, MAGIC.len())? != Some(MAGIC) {
         return Err(DataError::new("is not an MCAP file").at(path));
@@ -101,7 +102,10 @@ impl Container for Mcap {
     }
 
     fn read(&self, locator: &Locator) -> DataResult<Payload> {
-        self.file.read(&self.blocks, locator)
+        let payload = self.file.read(&self.blocks, locator)?;
+        let plain = unpack::message(payload.bytes(), MAX_MESSAGE_BYTES);
+        let plain = plain.map_err(|e| DataError::new("a compressed message is damaged").because(e))?;
+        Ok(plain.map_or(payload, Payload::Alone))
     }
 
     fn byte(&self, locator: &Locator) -> Option<u64> {
@@ -190,6 +194,25 @@ impl Records for McapRecords {
                     if let Some(wanted) = wanted.filter(|_| data <= MAX_MESSAGE_BYTES)
                         && let Some(bytes) = source.get(content + MESSAGE_PREFIX, wanted as usize)?
                     {
+                        let plain = match bytes.starts_with(unpack::ZSTD_MAGIC) {
+                            true => {
+                                let all =
+                                    source.get(content + MESSAGE_PREFIX, data as usize)?.unwrap_or_default();
+                                let limit = match scan.wants[topic] {
+                                    Want::All => MAX_MESSAGE_BYTES,
+                                    Want::Head | Want::Nothing => HEAD_BYTES as u64,
+                                };
+                                // One that is damaged is for whoever decodes it to complain about.
+                                unpack::message(all, limit).ok().flatten()
+                            }
+                            false => None,
+                        };
+                        let bytes = match &plain {
+                            Some(plain) => plain.as_slice(),
+                            None => {
+                                source.get(content + MESSAGE_PREFIX, wanted as usize)?.unwrap_or_default()
+                            }
+                        };
                         let (at, bytes_len) = (content + MESSAGE_PREFIX, data as u32);
                         let locator = Locator { file, block, at, bytes: bytes_len };
                         let encoding = scan.topics[topic].encoding;
@@ -217,8 +240,7 @@ fn describe(
         }
         Ok(Record::Channel(channel)) => {
             let kind = state.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
-            let encoding = Encoding::from_name(&channel.message_encoding);
-            let topic = scan.topic(&channel.topic, &kind, encoding, visitor);
+            let topic = scan.topic(&channel.topic, &kind, &channel.message_encoding, visitor);
             state.topics.insert(u32::from(channel.id), topic);
         }
         Ok(_) => {}

@@ -9,6 +9,7 @@ mod db3;
 mod find;
 mod mcap;
 mod ros1;
+mod unpack;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -54,6 +55,8 @@ pub(crate) struct Topic {
     pub(crate) kind: String,
     /// How they are serialised.
     pub(crate) encoding: Encoding,
+    /// The name that the recording has for that, such as `cdr` or `json`.
+    pub(crate) format: String,
     /// How many there are.
     pub(crate) count: u64,
     /// Record times of the earliest and the latest.
@@ -61,6 +64,11 @@ pub(crate) struct Topic {
 }
 
 impl Topic {
+    /// Whether it has messages, in an encoding that is read.
+    pub(crate) fn is_read(&self) -> bool {
+        self.count > 0 && self.encoding != Encoding::Other
+    }
+
     fn note(&mut self, recorded: Stamp, count: u64) {
         self.count += count;
         let (first, last) = self.recorded.unwrap_or((recorded, recorded));
@@ -108,7 +116,7 @@ pub(crate) struct Message<'a> {
 
 /// Sees the messages of a recording in the order in which they were written.
 pub(crate) trait Visitor {
-    /// Asked once a topic, before its first message.
+    /// Asked once a topic that can be read, before its first message.
     fn want(&mut self, topic: usize, info: &Topic) -> Want;
     /// A message of a topic that is wanted.
     fn message(&mut self, message: &Message<'_>);
@@ -121,20 +129,22 @@ pub(crate) struct Scan {
     pub(crate) topics: Vec<Topic>,
     /// Damage that was passed over, one line each with the byte.
     pub(crate) damage: Vec<String>,
-    by_name: HashMap<(String, String), usize>,
+    by_name: HashMap<(String, String, String), usize>,
     wants: Vec<Want>,
 }
 
 impl Scan {
     /// The index of a topic; `kind` may be in the long form of ROS 2, `nav_msgs/msg/Odometry`.
-    fn topic(&mut self, name: &str, kind: &str, encoding: Encoding, visitor: &mut dyn Visitor) -> usize {
+    fn topic(&mut self, name: &str, kind: &str, format: &str, visitor: &mut dyn Visitor) -> usize {
         let kind = kind.replace("/msg/", "/");
-        let key = (name.to_string(), kind);
+        let key = (name.to_string(), kind, format.to_string());
         if let Some(&topic) = self.by_name.get(&key) {
             return topic;
         }
         let topic = self.topics.len();
-        let info = Topic { name: key.0.clone(), kind: key.1.clone(), encoding, count: 0, recorded: None };
+        let encoding = Encoding::from_name(format);
+        let (name, kind, format) = key.clone();
+        let info = Topic { name, kind, encoding, format, count: 0, recorded: None };
         let readable = encoding != Encoding::Other;
         self.wants.push(if readable { visitor.want(topic, &info) } else { Want::Nothing });
         self.topics.push(info);
@@ -174,22 +184,54 @@ trait Container: Send + Sync {
 /// A recording of one or several files, read as one.
 pub(crate) struct Recording {
     files: Vec<(PathBuf, Box<dyn Container>)>,
+    /// Files that had to be copied to be read, until the recording is closed.
+    _copies: Vec<unpack::Copy>,
+    /// What was damaged already when the files were opened.
+    damage: Vec<String>,
 }
 
 impl Recording {
     /// Opens what [`find`] found.
     pub(crate) fn open(found: &Found) -> DataResult<Self> {
         let mut files: Vec<(PathBuf, Box<dyn Container>)> = Vec::new();
+        let (mut copies, mut damage) = (Vec::new(), Vec::new());
         for path in &found.files {
-            let kind = find::kind_of(path).map_err(|e| e.at(path))?;
+            let (kind, packed) = find::kind_of(path).map_err(|e| e.at(path))?;
+            let mut copy = if packed { Some(unpack::unpack(path)?) } else { None };
+            if kind == find::Kind::Sqlite && !packed && unpack::has_log(path) {
+                let log = unpack::log_of(path);
+                match unpack::with_log(path) {
+                    Ok(merged) => {
+                        copy = Some(merged);
+                        let problem =
+                            "the recorder was not stopped properly: what is here is read with the data base";
+                        damage.push(DataError::new(problem).at(log).to_string());
+                    }
+                    Err(e) => damage.push(
+                        DataError::new(format!(
+                            "what sqlite had not merged into the data base is not read: {e}"
+                        ))
+                        .at(&log)
+                        .hint("open a copy once with sqlite3 to merge it")
+                        .to_string(),
+                    ),
+                }
+            }
+            let problem = copy.as_ref().and_then(|copy| copy.damage.as_deref());
+            damage.extend(problem.map(|problem| DataError::new(problem).at(path).to_string()));
+            // What is said is said of the file that the user has.
+            let place = copy.as_ref().map_or(path.as_path(), |copy| copy.path.as_path());
             let container: Box<dyn Container> = match kind {
-                find::Kind::Ros1 => Box::new(ros1::open(path)?),
-                find::Kind::Mcap => Box::new(mcap::open(path)?),
-                find::Kind::Sqlite => Box::new(db3::Db3::open(path, found.compressed_messages)?),
+                find::Kind::Ros1 => Box::new(ros1::open(path, place)?),
+                find::Kind::Mcap => Box::new(mcap::open(path, place)?),
+                find::Kind::Sqlite => {
+                    Box::new(db3::Db3::open(path, place, found.compressed_messages, copy.is_some())?)
+                }
             };
             files.push((path.clone(), container));
+            copies.extend(copy);
         }
-        Ok(Self { files })
+        Ok(Self { files, _copies: copies, damage })
     }
 
     /// Walks all files.
@@ -199,7 +241,7 @@ impl Recording {
     /// # Errors
     /// [`DataError`] if a file cannot be read at all.
     pub(crate) fn scan(&self, visitor: &mut dyn Visitor) -> DataResult<Scan> {
-        let mut scan = Scan::default();
+        let mut scan = Scan { damage: self.damage.clone(), ..Scan::default() };
         for (file, (path, container)) in (0_u32..).zip(&self.files) {
             container.scan(file, &mut scan, visitor).map_err(|e| e.at(path))?;
         }

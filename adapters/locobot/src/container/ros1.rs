@@ -33,9 +33,9 @@ pub(super) struct Ros1 {
     damage: Vec<DataError>,
 }
 
-/// Finds the chunks of a bag.
-pub(super) fn open(path: &Path) -> DataResult<Ros1> {
-    let file = BlockFile::open(path)?;
+/// Finds the chunks of a bag, which lies at `place` where it had to be unpacked.
+pub(super) fn open(path: &Path, place: &Path) -> DataResult<Ros1> {
+    let file = BlockFile::open(path, place)?;
     let mut source = file.window();
     let version = source.get(0, VERSION.len())?.unwrap_or_default();
     if version != VERSION {
@@ -140,7 +140,7 @@ impl Records for BagRecords {
                 OP_CONNECTION => {
                     let header = source.get(record.data_at, record.data_len as usize)?.unwrap_or_default();
                     let kind = fields(header).find(|f| f.0 == b"type").map(|f| text(f.1)).unwrap_or_default();
-                    let topic = scan.topic(&record.text, &kind, Encoding::Ros1, visitor);
+                    let topic = scan.topic(&record.text, &kind, "ros1", visitor);
                     state.topics.insert(conn, topic);
                 }
                 OP_MESSAGE => {

@@ -45,7 +45,7 @@ fn read_bytes(bytes: &[u8]) -> DataResult<Seen> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a");
     std::fs::write(&path, bytes).unwrap();
-    read(&Found { files: vec![path], compressed_messages: false })
+    read(&Found { files: vec![path], ..Found::default() })
 }
 
 fn check(seen: &Seen, messages: &[Msg], encoding: usize) {
@@ -76,7 +76,7 @@ fn all_containers_give_the_same_messages() {
     for compressed in [false, true] {
         let path = folder.path().join(format!("{compressed} 50%#?.db3"));
         db3(&path, &messages, compressed);
-        let found = Found { files: vec![path], compressed_messages: compressed };
+        let found = Found { files: vec![path], compressed_messages: compressed, ..Found::default() };
         check(&read(&found).unwrap(), &messages, 1);
     }
     let left: Vec<PathBuf> = std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().path()).collect();
@@ -90,7 +90,7 @@ fn heads_are_short_and_cost_no_more() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.bag");
     std::fs::write(&path, bag(&messages, "none", 4, true)).unwrap();
-    let recording = Recording::open(&Found { files: vec![path], compressed_messages: false }).unwrap();
+    let recording = Recording::open(&Found { files: vec![path], ..Found::default() }).unwrap();
     let mut all = All { heads: true, ..All::default() };
     recording.scan(&mut all).unwrap();
     assert_eq!(all.seen.len(), messages.len());
@@ -236,7 +236,7 @@ fn a_damaged_data_base_is_read_as_far_as_it_goes() {
     db3(&path, &messages, false);
     let bytes = std::fs::read(&path).unwrap();
     std::fs::write(&path, &bytes[..bytes.len() * 2 / 3 / 4096 * 4096]).unwrap();
-    let seen = read(&Found { files: vec![path], compressed_messages: false }).unwrap();
+    let seen = read(&Found { files: vec![path], ..Found::default() }).unwrap();
     assert!((500..3000).contains(&seen.all.seen.len()), "{}", seen.all.seen.len());
     assert!(seen.damage().contains("read up to message"), "{}", seen.damage());
 }

@@ -97,7 +97,7 @@ fn oddities_are_noted() {
     builder.sample("b", "c", ms(5), at(2.0, 0.0));
     builder.sample("c", "c", ms(5), at(2.0, 0.0));
     let tree = builder.finish();
-    let notes = tree.notes.join("\n");
+    let notes = tree.notes.iter().map(Suspicion::line).collect::<Vec<_>>().join("\n");
     for expected in
         ["two parents in tf, a and x", "a -> b changes", "zero stamp", "repeat a stamp", "from `c` to `c`"]
     {
