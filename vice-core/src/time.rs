@@ -61,6 +61,14 @@ impl Stamp {
         parse_scaled(text, 9).map(Self)
     }
 
+    /// Reads decimal milliseconds exactly, rounding beyond the sixth decimal.
+    ///
+    /// # Errors
+    /// [`TimeError`] if the text is no decimal number or the value does not fit.
+    pub fn parse_millis(text: &str) -> Result<Self, TimeError> {
+        parse_scaled(text, 6).map(Self)
+    }
+
     /// Reads decimal microseconds exactly, rounding beyond the third decimal.
     ///
     /// # Errors
