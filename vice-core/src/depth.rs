@@ -6,6 +6,7 @@ use crate::camera::{Camera, Pixel};
 use crate::dataset::Floor;
 use crate::error::DataResult;
 use crate::frames::{BodyFromCamera, WorldFromCamera};
+use crate::suspicion::Suspicion;
 use crate::time::Stamp;
 
 /// A key frame as a depth source sees it.
@@ -107,5 +108,10 @@ pub trait DepthSource: Send + Sync {
     /// of a scanned cloud. Zero where the surface is smooth, or where depth does not depend on the camera's place.
     fn roughness(&self) -> f64 {
         0.0
+    }
+
+    /// What looked wrong in the data behind the source, each said once.
+    fn suspicions(&self) -> Vec<Suspicion> {
+        Vec::new()
     }
 }

@@ -158,6 +158,13 @@ impl Span {
         Self(self.0.saturating_abs())
     }
 
+    /// Seconds with as many digits as a person wants to see in a message.
+    pub fn to_short_text(self) -> String {
+        let seconds = self.as_secs_f64();
+        let text = if seconds.abs() < 0.1 { format!("{seconds:.4}") } else { format!("{seconds:.2}") };
+        text.trim_end_matches('0').trim_end_matches('.').to_string()
+    }
+
     /// The text form in seconds with nine decimals, exact.
     pub fn to_seconds_text(self) -> String {
         seconds_text(self.0)

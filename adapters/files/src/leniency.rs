@@ -3,7 +3,7 @@
 //! | found | what is done |
 //! | --- | --- |
 //! | a row whose values are NaN, or all missing | left out: it is a gap |
-//! | the stamp of the row before once more | the first is kept, unless most rows are such |
+//! | the stamp of the row before once more | the first is kept, unless every other row is such |
 //! | a quaternion up to 1 % off unit length | scaled to 1; beyond that the row is refused |
 //! | a byte-order mark where a line starts | passed over |
 //! | a heading, with `#` or without | names the columns |
@@ -42,6 +42,7 @@ pub struct Leniency {
     rows: u64,
     gaps: Met,
     duplicates: Met,
+    first_duplicate: Stamp,
     scaled: Met,
     worst_length: f64,
     widths: Met,
@@ -84,6 +85,9 @@ impl Leniency {
     pub fn order(&mut self, previous: Option<Stamp>, stamp: Stamp, line: u64) -> DataResult<Order> {
         match previous {
             Some(previous) if stamp == previous => {
+                if self.duplicates.count == 0 {
+                    self.first_duplicate = stamp;
+                }
                 self.duplicates.at(line);
                 Ok(Order::Again)
             }
@@ -113,16 +117,16 @@ impl Leniency {
     /// Checks at the end that what was left out is the exception.
     ///
     /// # Errors
-    /// [`DataError`] where all rows are gaps, or most rows repeat the stamp before.
+    /// [`DataError`] where all rows are gaps, or half of them repeat the stamp before.
     pub fn check(&self, kept: usize, what: &str) -> DataResult<()> {
         if kept == 0 && self.gaps.count > 0 {
             return Err(DataError::new(format!("none of the {} rows has a {what}: all are NaN", self.rows))
                 .line(self.gaps.first_line));
         }
-        if 2 * self.duplicates.count > self.rows {
+        if 2 * self.duplicates.count >= self.rows.max(1) {
             return Err(DataError::new(format!(
-                "{} of {} rows have the stamp of the row before",
-                self.duplicates.count, self.rows
+                "stamp {} ns appears twice: {} of {} rows have the stamp of the row before",
+                self.first_duplicate, self.duplicates.count, self.rows
             ))
             .line(self.duplicates.first_line)
             .hint("were the stamps rounded, as a spreadsheet does? Write them with all their digits"));

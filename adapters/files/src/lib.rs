@@ -7,6 +7,7 @@
 //! | [`calibration`] | TOML or Kalibr files that override intrinsics and extrinsics |
 //! | [`rigid_file`] | the place of an estimate's frame in the body |
 //! | [`image_file`] | PNG and JPEG |
+//! | [`imu_file`] | inertial samples in a table |
 //! | [`rows`], [`heading`], [`columns`] | text in rows, and which column holds what by its name |
 //! | [`yaml`] | YAML with OpenCV's dialect |
 //! | [`leniency`] | what readers repair or leave out, one rule for all |
@@ -20,6 +21,7 @@ pub mod calibration;
 pub mod columns;
 pub mod heading;
 pub mod image_file;
+pub mod imu_file;
 pub mod labels;
 pub mod leniency;
 pub mod not_text;

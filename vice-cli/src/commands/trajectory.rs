@@ -4,14 +4,17 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use serde::Serialize;
+use vice_core::conventions::{Given, cure, parse_list, suspect};
 use vice_core::metrics::align::{Alignment, align};
 use vice_core::metrics::associate::{Matching, PosePairs, crop};
 use vice_core::metrics::plane::Plane;
 use vice_core::metrics::rpe::{Delta, DeltaUnit, PairMode, PairsFrom, Rpe, RpeErrors, RpeOptions};
 use vice_core::metrics::trajectory::{Ape, ApeErrors, Statistics, Summary};
+use vice_core::suspicion::{Suspicion, Suspicions};
 use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
 use vice_files::atomic::Overwrite;
+use vice_files::leniency;
 use vice_files::trajectory::{ReadOptions, TrajectoryFormat, read_spec};
 
 use crate::inputs::{Outputs, span, span_not_negative, to_json};
@@ -24,7 +27,8 @@ use crate::terminal::{self, Outcome, usage};
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example: vice trajectory ground_truth.csv estimate.txt --align se3 --delta 1 --delta-unit meters --all-pairs\n\n\
-    Files are TUM, EuRoC CSV or KITTI by their content, or relative motions as rel:FILE."
+    Files are tables with a heading that names the columns, else TUM, EuRoC CSV or KITTI by their content, or relative\n\
+    motions as rel:FILE."
 )]
 pub(crate) struct Args {
     /// Reference trajectory.
@@ -75,6 +79,9 @@ pub(crate) struct Args {
     /// Times of KITTI files [default: times.txt beside each].
     #[arg(long, value_name = "FILE")]
     times: Option<PathBuf>,
+    /// What the estimate's poses are, where the file was read as something else, such as wxyz, inverse or mm.
+    #[arg(long, value_name = "WORD,...")]
+    estimate_as: Option<String>,
     /// Result document, vice.trajectory/1; - prints it in place of the table.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -102,6 +109,8 @@ struct Document {
     rpe: Option<RpePart>,
     #[serde(skip_serializing_if = "Option::is_none")]
     rpe_problem: Option<String>,
+    #[serde(skip_serializing_if = "Suspicions::is_empty")]
+    suspicions: Suspicions,
 }
 
 #[derive(Serialize)]
@@ -118,7 +127,18 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let read_files =
         [&args.reference, &args.estimate].map(|s| PathBuf::from(s.strip_prefix("rel:").unwrap_or(s)));
     let outputs = Outputs::new(&[&args.json, &args.plot, &args.evo_zip], &read_files)?;
-    let (reference, estimate) = read_both(args)?;
+    let conventions = match &args.estimate_as {
+        Some(words) => parse_list(words).map_err(|e| usage(format!("--estimate-as: {e}")))?,
+        None => Vec::new(),
+    };
+    let Both { reference, estimate, mut suspicions } = read_both(args)?;
+    // What was read may be why nothing fits, so it is said before anything is refused.
+    leniency::log(&suspicions);
+    let estimate = match conventions.is_empty() {
+        true => estimate,
+        false => cure(&conventions, &estimate, Given::default())
+            .with_context(|| format!("--estimate-as of {}", args.estimate))?,
+    };
     // As evo: what the reference no longer has is not matched either.
     let reference = crop(&reference, args.t_start, args.t_end).with_context(|| args.reference.clone())?;
     let matching = match args.interpolate {
@@ -127,6 +147,11 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     };
     let pairs = PosePairs::match_up(&reference, &estimate, matching, args.t_offset)
         .with_context(|| format!("{} against {}", args.estimate, args.reference))?;
+    if let Some(found) = suspect(&pairs, Given::default()) {
+        let suspicion = Suspicion::new("convention", &args.estimate, found.line());
+        tracing::warn!("{}", suspicion.line());
+        suspicions.add(suspicion);
+    }
     let n_to_align = args.n_to_align.map(|n| usize::try_from(n).unwrap_or(usize::MAX));
     let transform = align(&pairs, args.align, n_to_align)
         .with_context(|| format!("--align {} of {}", args.align.name(), args.estimate))?;
@@ -161,6 +186,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         ape: ApeErrors::of(&pairs).statistics()?,
         rpe,
         rpe_problem,
+        suspicions,
     };
     let mut texts = Vec::new();
     if let Some(path) = &args.json {
@@ -181,8 +207,15 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
+/// Both trajectories, and what looked wrong when they were read.
+struct Both {
+    reference: Trajectory,
+    estimate: Trajectory,
+    suspicions: Suspicions,
+}
+
 /// Two KITTI files without times are compared row by row; one alone has no clock to compare by.
-fn read_both(args: &Args) -> anyhow::Result<(Trajectory, Trajectory)> {
+fn read_both(args: &Args) -> anyhow::Result<Both> {
     let read = |spec: &str, index_as_seconds| {
         read_spec(spec, &ReadOptions { times: args.times.clone(), index_as_seconds })
     };
@@ -194,7 +227,9 @@ fn read_both(args: &Args) -> anyhow::Result<(Trajectory, Trajectory)> {
         (_, TrajectoryFormat::Kitti) => estimate = read(&args.estimate, false)?,
         _ => {}
     }
-    Ok((reference.trajectory, estimate.trajectory))
+    let mut suspicions = reference.suspicions;
+    suspicions.extend(estimate.suspicions);
+    Ok(Both { reference: reference.trajectory, estimate: estimate.trajectory, suspicions })
 }
 
 fn stamp(text: &str) -> Result<Stamp, String> {

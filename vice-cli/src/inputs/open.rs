@@ -74,9 +74,11 @@ impl DatasetArgs {
         calibration: Option<&CalibrationFile>,
     ) -> anyhow::Result<UsedCamera> {
         let name = self.camera_name(dataset)?;
-        if let Some(file) = calibration {
-            check_calibrated(file, &name)?;
-        }
+        let calibration = match calibration {
+            Some(file) => Some(file.for_camera(&name, &dataset.cameras()).map_err(|e| usage(format!("--calibration: {e}")))?),
+            None => None,
+        };
+        let calibration = calibration.as_ref();
         let overridden = match calibration {
             // The file may hold only extrinsics, or be all there is where the data set's own is broken.
             Some(file) => file.camera(&name, dataset.camera(&name).ok().as_ref())?,
@@ -90,18 +92,6 @@ impl DatasetArgs {
         let frames = dataset.frames(&name)?;
         Ok(UsedCamera { name, camera, frames, body_from_camera })
     }
-}
-
-/// A file that says nothing about the camera in use is a mistake, unless all it holds is a clock offset.
-fn check_calibrated(file: &CalibrationFile, camera: &str) -> anyhow::Result<()> {
-    if file.cameras().is_empty() || file.cameras().contains_key(camera) {
-        return Ok(());
-    }
-    let known: Vec<&str> = file.cameras().keys().map(String::as_str).collect();
-    Err(usage(format!(
-        "--calibration: the file is of {}, the camera is {camera}; give its entry that name",
-        known.join(", ")
-    )))
 }
 
 pub(crate) fn setting(text: &str) -> Result<(String, String), String> {

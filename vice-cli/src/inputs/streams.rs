@@ -79,7 +79,7 @@ pub(crate) fn load_streams(
     calibration: Option<&CalibrationFile>,
     world_depth: bool,
 ) -> anyhow::Result<LoadedStreams> {
-    let time_offset = args.time_offset.or(calibration.and_then(|c| c.time_offset)).unwrap_or(Span::ZERO);
+    let time_offset = args.time_offset.or(calibration.and_then(|c| c.time_offset_of(&used.name))).unwrap_or(Span::ZERO);
     let mut loader = Loader { args, dataset, used, selection, time_offset, world_depth, reference: None };
     loader.reference = loader.load_reference()?;
     let mut list: Vec<Stream> = loader.reference.iter().cloned().collect();
@@ -161,7 +161,9 @@ impl Loader<'_> {
             );
         }
         let options = ReadOptions { times: self.args.times.clone(), ..ReadOptions::default() };
-        Ok(read_spec(spec, &options)?.trajectory)
+        let file = read_spec(spec, &options)?;
+        vice_files::leniency::log(&file.suspicions);
+        Ok(file.trajectory)
     }
 
     /// Poses of a camera or another frame as poses of the body. Said by the user, never guessed.

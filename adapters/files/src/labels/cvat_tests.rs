@@ -1,3 +1,4 @@
+use super::super::write_cvat;
 use super::*;
 use proptest::prelude::*;
 

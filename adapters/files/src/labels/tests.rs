@@ -51,7 +51,7 @@ fn bad_rows_are_named() {
         assert!(error.to_string().contains(expected), "{error}");
         assert_eq!(error.place(), Some(Place::Line(line)), "{error}");
     };
-    says("0,2,nan,3,0,,", 3, "not finite");
+    says("0,2,nan,3,1,,", 3, "not finite");
     says("0,2,2,inf,0,,", 3, "not finite");
     says("0,1,2,3,0,,", 3, "twice");
     says("0,x,2,3,0,,", 3, "timestamp_ns: `x`");

@@ -34,6 +34,17 @@ pub(super) struct PoseLayout {
     pub(super) passes_over: bool,
 }
 
+/// What columns without names hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Places {
+    /// What the first row shows.
+    Shown,
+    /// `ns,x,y,z,qw,qx,qy,qz` and optionally more, as EuRoC has it.
+    Euroc,
+    /// The same eight with microseconds, as Blackbird has it.
+    Blackbird,
+}
+
 /// What the rows of a file are.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Layout {
@@ -41,15 +52,26 @@ pub(super) enum Layout {
     Matrices(MatrixRows),
 }
 
-/// The layout by the heading, else by the first row. `euroc` is the layout of EuRoC whatever a row looks like.
-pub(super) fn find(beginning: &Beginning, row: &Row<'_>, euroc: bool) -> DataResult<Layout> {
+/// The layout by the heading, else by the places.
+pub(super) fn find(beginning: &Beginning, row: &Row<'_>, places: Places) -> DataResult<Layout> {
     let headings = beginning.heading.iter().chain(&beginning.comments);
     for heading in headings {
         if let Some(layout) = by_names(heading, row)? {
             return Ok(Layout::Poses(layout));
         }
     }
-    if euroc { Ok(Layout::Poses(by_place(row, TrajectoryFormat::Euroc)?)) } else { by_first_row(row) }
+    match places {
+        Places::Shown => by_first_row(row),
+        Places::Euroc => by_place(row, TrajectoryFormat::Euroc).map(Layout::Poses),
+        Places::Blackbird => {
+            row.expect_columns(POSE_COLUMNS)?;
+            if row.len() > POSE_COLUMNS {
+                return Err(one_more(row, "the table has 8"));
+            }
+            let layout = by_place(row, TrajectoryFormat::Euroc)?;
+            Ok(Layout::Poses(PoseLayout { time: TimeColumn::new(0, Some(TimeUnit::Micros)), ..layout }))
+        }
+    }
 }
 
 /// `None` where the heading is none of poses.
@@ -178,7 +200,7 @@ fn by_place(row: &Row<'_>, format: TrajectoryFormat) -> DataResult<PoseLayout> {
     // One column more or less means that something stands elsewhere than it is looked for.
     let near = columns == POSE_COLUMNS + 1 || (euroc && columns.abs_diff(EUROC_COLUMNS) == 1);
     if near {
-        return Err(one_more(row, euroc));
+        return Err(one_more(row, if euroc { "EuRoC has 8 or 17" } else { "TUM has 8" }));
     }
     row.expect_columns(POSE_COLUMNS)?;
     let rotation = if euroc { [4, 5, 6, 7] } else { [7, 4, 5, 6] };
@@ -203,8 +225,7 @@ fn by_place(row: &Row<'_>, format: TrajectoryFormat) -> DataResult<PoseLayout> {
     })
 }
 
-fn one_more(row: &Row<'_>, euroc: bool) -> DataError {
-    let expected = if euroc { "EuRoC has 8 or 17" } else { "TUM has 8" };
+fn one_more(row: &Row<'_>, expected: &str) -> DataError {
     let first = row.field(0).unwrap_or_default();
     let index = first.len() < 10 && first.bytes().all(|b| b.is_ascii_digit());
     let index = if index { format!("; column 1 is {first}: a running number?") } else { String::new() };

@@ -32,7 +32,7 @@ use vice_core::trajectory::{Trajectory, TrajectoryError};
 use crate::leniency::Leniency;
 
 pub use matrix::{MatrixPoses, MatrixStamps};
-pub use parse::{Parsed, read_rows};
+pub use parse::{Parsed, PoseRows, read_micros_rows, read_rows};
 pub use relative::read_relative_rows;
 pub use write::{write_euroc, write_kitti, write_relative, write_tum};
 
@@ -181,6 +181,11 @@ pub fn read_euroc(path: impl AsRef<Path>) -> DataResult<TrajectoryFile> {
 pub fn read_relative(path: impl AsRef<Path>) -> DataResult<TrajectoryFile> {
     let path = path.as_ref();
     read_relative_rows(crate::rows::open(path)?).map(|file| file.about(path)).map_err(|e| e.at(path))
+}
+
+/// Whether a table begins with poses, by the names above it or its first rows.
+pub fn looks_like_poses(path: impl AsRef<Path>) -> bool {
+    crate::rows::open(path).and_then(parse::first_is_pose).unwrap_or(false)
 }
 
 /// An error of the core, which counts rows, as one of a file, which counts lines.

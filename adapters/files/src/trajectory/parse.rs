@@ -1,12 +1,14 @@
 //! From rows to poses.
 
 use std::io::BufRead;
+use std::path::Path;
 
 use vice_core::error::{DataError, DataResult};
+use vice_core::suspicion::Suspicions;
 use vice_core::time::Stamp;
 use vice_core::trajectory::{PoseRow, Trajectory};
 
-use super::layout::{self, Layout, PoseLayout};
+use super::layout::{self, Layout, Places, PoseLayout};
 use super::matrix::{MatrixCollector, MatrixPoses};
 use super::{InertialRow, TrajectoryFile, at_line};
 use crate::leniency::{Leniency, Order};
@@ -26,34 +28,74 @@ pub enum Parsed {
 /// # Errors
 /// [`DataError`] with the line, as [`super::read`].
 pub fn read_rows<R: BufRead>(rows: Rows<R>) -> DataResult<Parsed> {
-    collect(rows, false)
+    collect(rows, Places::Shown)
+}
+
+/// Rows of poses as they stand in a file, before they are taken for poses of the body.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PoseRows {
+    /// The poses.
+    pub rows: Vec<PoseRow>,
+    /// The line of each.
+    pub lines: Vec<u64>,
+    /// What was left out.
+    pub suspicions: Suspicions,
+}
+
+/// Reads `µs, x, y, z, qw, qx, qy, qz`, or a table whose heading names the columns.
+///
+/// # Errors
+/// [`DataError`] with path and line, as [`super::read`].
+pub fn read_micros_rows(path: &Path) -> DataResult<PoseRows> {
+    let read = |rows| {
+        let (collected, lenient) = gather(rows, Places::Blackbird)?;
+        let Collected::Poses(poses) = collected else { return Err(DataError::new("the rows have no stamps")) };
+        lenient.check(poses.poses.len(), "pose")?;
+        let suspicions = lenient.suspicions(&path.display().to_string());
+        Ok(PoseRows { rows: poses.poses, lines: poses.lines, suspicions })
+    };
+    crate::rows::open(path).and_then(read).map_err(|e| e.at(path))
 }
 
 /// Reads rows in the ground-truth layout of EuRoC, whatever else they might be, unless names say otherwise.
 pub(super) fn read_euroc_rows<R: BufRead>(rows: Rows<R>) -> DataResult<TrajectoryFile> {
-    match collect(rows, true)? {
+    match collect(rows, Places::Euroc)? {
         Parsed::Stamped(file) => Ok(file),
         Parsed::Kitti(..) => Err(DataError::new("the rows have no stamps")),
     }
 }
 
-fn collect<R: BufRead>(mut rows: Rows<R>, euroc: bool) -> DataResult<Parsed> {
+fn collect<R: BufRead>(rows: Rows<R>, places: Places) -> DataResult<Parsed> {
+    let (collected, lenient) = gather(rows, places)?;
+    collected.finish(lenient)
+}
+
+fn gather<R: BufRead>(mut rows: Rows<R>, places: Places) -> DataResult<(Collected, Leniency)> {
     let beginning = rows.begin()?;
     let mut lenient = Leniency::new();
     let mut collected: Option<Collected> = None;
     while let Some(row) = rows.next_row()? {
         let collected = match &mut collected {
             Some(collected) => collected,
-            None => collected.insert(Collected::new(layout::find(&beginning, &row, euroc)?)),
+            None => collected.insert(Collected::new(layout::find(&beginning, &row, places)?)),
         };
         lenient.row();
         collected.push(&row, &mut lenient)?;
     }
     match collected {
-        Some(collected) => collected.finish(lenient),
+        Some(collected) => Ok((collected, lenient)),
         None if beginning.heading.is_some() => Err(DataError::new("the file holds a heading but no poses")),
         None => Err(DataError::new("the file is empty: it holds no poses")),
     }
+}
+
+/// Whether the first row is a pose.
+pub(super) fn first_is_pose<R: BufRead>(mut rows: Rows<R>) -> DataResult<bool> {
+    let beginning = rows.begin()?;
+    let Some(row) = rows.next_row()? else { return Ok(false) };
+    let mut collected = Collected::new(layout::find(&beginning, &row, Places::Shown)?);
+    collected.push(&row, &mut Leniency::new())?;
+    collected.finish(Leniency::new()).map(|_| true)
 }
 
 /// The rows so far, in the layout of the first.
