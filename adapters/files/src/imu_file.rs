@@ -54,8 +54,8 @@ fn read_rows<R: BufRead>(mut rows: Rows<R>, about: &str) -> DataResult<ImuFile> 
             Some(columns) => columns,
             None => columns.insert(find(&beginning, &row)?),
         };
-        row.expect_columns(columns.width)?;
-        if row.len() != columns.width {
+        row.expect_width(columns.width)?;
+        if row.len() > columns.width {
             return Err(row.error(format!("expected {} columns, found {}", columns.width, row.len())));
         }
         lenient.row();

@@ -278,6 +278,15 @@ impl<'a> Row<'a> {
         Err(self.error(format!("expected {expected} columns, found {}{cut}", self.len())))
     }
 
+    /// Checks that there are at least `expected` columns, an empty last one included, which ends with its separator.
+    ///
+    /// # Errors
+    /// As [`Row::expect_columns`].
+    pub fn expect_width(&self, expected: usize) -> DataResult<()> {
+        let empty_last = self.len() + 1 == expected && self.text.ends_with([',', ';']);
+        if empty_last { Ok(()) } else { self.expect_columns(expected) }
+    }
+
     /// A finite number.
     ///
     /// # Errors

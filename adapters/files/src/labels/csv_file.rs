@@ -141,7 +141,10 @@ impl Lines<'_> {
 /// # Errors
 /// [`io::Error`] of the writer.
 pub fn write_csv(writer: &mut dyn Write, labels: &LabelSet) -> io::Result<()> {
-    let mut csv = csv::Writer::from_writer(writer);
+    // A name that begins as a byte-order mark does would be taken for one where a line starts.
+    let marked = labels.points().iter().any(|p| p.name.starts_with('\u{feff}'));
+    let quotes = if marked { csv::QuoteStyle::Always } else { csv::QuoteStyle::Necessary };
+    let mut csv = csv::WriterBuilder::new().quote_style(quotes).from_writer(writer);
     csv.write_record(["point", "timestamp_ns", "u_px", "v_px", "keyframe", "source", "flags"])?;
     for point in labels.points() {
         for o in &point.observations {

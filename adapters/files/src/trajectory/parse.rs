@@ -148,7 +148,7 @@ impl PoseCollector {
     fn push(&mut self, row: &Row<'_>, lenient: &mut Leniency) -> DataResult<()> {
         let PoseLayout { position, metres, rotation, inertial, width, .. } = self.layout;
         // Without names the columns beyond the eighth are nobody's.
-        row.expect_columns(if self.layout.passes_over { 8 } else { width })?;
+        row.expect_width(if self.layout.passes_over { 8 } else { width })?;
         if row.len() == width + 1 {
             return Err(row.error(format!("expected {width} columns as in the first row, found {}", row.len())));
         }
