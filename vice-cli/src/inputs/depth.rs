@@ -69,7 +69,11 @@ fn on_off(text: &str) -> Result<bool, String> {
 
 impl DepthArgs {
     pub(crate) fn calibration(&self) -> anyhow::Result<Option<CalibrationFile>> {
-        Ok(self.calibration.as_ref().map(CalibrationFile::read).transpose()?)
+        let file = self.calibration.as_ref().map(CalibrationFile::read).transpose()?;
+        if let Some(file) = &file {
+            vice_files::leniency::log(file.suspicions());
+        }
+        Ok(file)
     }
 
     /// The floor that replaces the data set's.

@@ -21,6 +21,7 @@ use vice_core::camera::{Camera, Pixel};
 use vice_core::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
 use vice_core::error::DataResult;
 use vice_core::frames::{self, Rigid, World};
+use vice_core::suspicion::Suspicion;
 
 use crate::cloud::Cloud;
 use interpolate::{Limits, Local, Surface};
@@ -135,6 +136,10 @@ impl ZMapDepth {
 impl DepthSource for ZMapDepth {
     fn name(&self) -> &str {
         "zmap"
+    }
+
+    fn suspicions(&self) -> Vec<Suspicion> {
+        self.cloud.suspicions().iter().cloned().collect()
     }
 
     fn roughness(&self) -> f64 {

@@ -201,4 +201,6 @@ pub(crate) fn at_line(error: &TrajectoryError, lines: &[u64]) -> DataError {
 }
 
 #[cfg(test)]
+mod dialect_tests;
+#[cfg(test)]
 mod tests;
