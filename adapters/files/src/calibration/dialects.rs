@@ -195,6 +195,9 @@ fn intrinsics_of_matrix(key: &str, value: &Value) -> DataResult<[f64; 4]> {
 }
 
 fn entry_of(map: &Map<String, Value>) -> DataResult<Entry> {
+    if let Some(error) = model_problem(map) {
+        return Err(error);
+    }
     let mut entry = Entry::default();
     let mut single: [Option<f64>; 4] = [None; 4];
     let mut coefficients: [Option<f64>; 8] = [None; 8];
@@ -214,9 +217,9 @@ fn entry_of(map: &Map<String, Value>) -> DataResult<Entry> {
                     Ok(found) => found,
                     Err(values) if values.len() == 9 => intrinsics_of_matrix(key, value)?,
                     Err(_) => {
-                        return Err(model_problem(map, camera_model.as_deref()).unwrap_or_else(|| {
-                            DataError::new(format!("is not the YAML expected: {key} are fx, fy, cx, cy: 4 numbers, not {count}"))
-                        }));
+                        return Err(DataError::new(format!(
+                            "is not the YAML expected: {key} are fx, fy, cx, cy: 4 numbers, not {count}"
+                        )));
                     }
                 };
                 set(&mut entry.camera.intrinsics, key, found)?;
@@ -277,9 +280,6 @@ fn entry_of(map: &Map<String, Value>) -> DataResult<Entry> {
             Key::Unknown => entry.unused.push(key.clone()),
         }
     }
-    if let Some(error) = model_problem(map, camera_model.as_deref()) {
-        return Err(error);
-    }
     if let [Some(fx), Some(fy), Some(cx), Some(cy)] = single {
         set(&mut entry.camera.intrinsics, "fx, fy, cx, cy", [fx, fy, cx, cy])?;
     } else if single.iter().any(Option::is_some) {
@@ -319,9 +319,9 @@ fn roi_is_whole(value: &Value) -> bool {
 }
 
 /// Kalibr's `omni`, `eucm` and `ds` have further intrinsics that the pinhole models do not.
-fn model_problem(map: &Map<String, Value>, found: Option<&str>) -> Option<DataError> {
-    let key = map.keys().find(|key| keys::of(key) == Key::CameraModel)?;
-    let model = found.or_else(|| map.get(key).and_then(Value::as_str))?;
+fn model_problem(map: &Map<String, Value>) -> Option<DataError> {
+    let (key, model) = map.iter().find(|(key, _)| keys::of(key) == Key::CameraModel)?;
+    let model = model.as_str()?;
     let known = ["pinhole", "kannala_brandt", "kannalabrandt8", "perspective", "pinhole_camera"];
     (!known.contains(&model.to_lowercase().as_str()))
         .then(|| DataError::new(format!("unknown {key} `{model}`; known: pinhole")))

@@ -4,6 +4,7 @@ use vice_core::error::{DataError, DataResult, ErrorKind};
 
 use super::TrajectoryFormat;
 use super::matrix::{self, MatrixRows};
+use super::relative;
 use crate::columns::{Quantity, TimeUnit};
 use crate::heading::{Heading, TimeColumn};
 use crate::rows::{Beginning, Row, Separator};
@@ -88,10 +89,7 @@ fn by_names(heading: &Heading, row: &Row<'_>) -> DataResult<Option<PoseLayout>> 
         _ if !certain => return Ok(None),
         (Ok(position), Ok(rotation)) => return Err(incomplete(heading, position.is_some(), rotation.is_some())),
     };
-    let times = heading.times();
-    if let [a, b] = times[..]
-        && relative_times(heading, a, b)
-    {
+    if relative::names_motion(heading) {
         return Err(heading
             .error(format!("the heading names two stamps, {}: these are relative motions", heading.shown()))
             .hint("read them as rel:FILE"));
@@ -144,12 +142,6 @@ fn by_names(heading: &Heading, row: &Row<'_>) -> DataResult<Option<PoseLayout>> 
         width: columns,
         passes_over: false,
     }))
-}
-
-/// Two stamps of which one is the start and one the end of a motion.
-fn relative_times(heading: &Heading, a: usize, b: usize) -> bool {
-    let numbered = |i: usize, n: char| heading.names()[i].text.trim_end().ends_with(n);
-    (numbered(a, '0') && numbered(b, '1')) || (numbered(a, '1') && numbered(b, '0'))
 }
 
 fn incomplete(heading: &Heading, position: bool, rotation: bool) -> DataError {

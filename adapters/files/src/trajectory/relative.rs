@@ -7,7 +7,7 @@ use vice_core::frames::Rigid;
 use vice_core::trajectory::{RelativeMotion, Trajectory};
 
 use super::{TrajectoryFile, TrajectoryFormat, at_line};
-use crate::columns::{Quantity, TimeUnit};
+use crate::columns::{ColumnName, Quantity, TimeUnit};
 use crate::heading::{Heading, TimeColumn};
 use crate::leniency::Leniency;
 use crate::rows::{Row, Rows};
@@ -110,27 +110,45 @@ fn by_names(heading: &Heading, row: &Row<'_>) -> DataResult<Option<Columns>> {
         }
     };
     let names = heading.names();
-    let is_end = |i: usize| {
-        let text = names[i].text.to_lowercase();
-        ["1", "to", "end", "next", "later", "curr", "j"].iter().any(|word| text.trim_end().ends_with(word))
-    };
-    let is_stamp = |i: &usize| {
-        let text = names[*i].text.to_lowercase();
-        let word = text.trim_end_matches(|c: char| c.is_ascii_digit());
-        names[*i].meaning.is_some_and(|(q, _)| q == Quantity::Time)
-            || names[*i].meaning.is_none() && ["t", "t_", "from", "to", "start", "end", "t_from", "t_to"].contains(&word)
-    };
-    let stamps: Vec<usize> = (0..names.len()).filter(is_stamp).collect();
+    let stamps = stamps(heading);
     let [a, b] = stamps[..] else {
         return Err(heading
             .error(format!("{} columns are named as stamps, a relative motion has 2: {}", stamps.len(), heading.shown()))
             .hint("a relative motion is `t0 t1 tx ty tz qx qy qz qw`"));
     };
-    let (from, to) = if is_end(a) && !is_end(b) { (b, a) } else { (a, b) };
+    let (from, to) = if is_end(&names[a]) && !is_end(&names[b]) { (b, a) } else { (a, b) };
     heading.check_width(row.len(), [from, to].into_iter().chain(position).chain(rotation))?;
     let metres = names[position[0]].metres().ok_or_else(|| {
         heading.error(format!("`{}` is in {}, which is no length", names[position[0]].text, names[position[0]].unit))
     })?;
     let time = |column: usize| TimeColumn::new(column, names[column].time_unit());
     Ok(Some(Columns { from: time(from), to: time(to), position, rotation, metres, width: row.len() }))
+}
+
+/// Words of the stamp at which a motion starts, and of the one at which it ends.
+const STARTS: [&str; 9] = ["t0", "time0", "stamp0", "timestamp0", "from", "start", "begin", "prev", "previous"];
+const ENDS: [&str; 8] = ["t1", "time1", "stamp1", "timestamp1", "to", "end", "next", "later"];
+
+fn is_end(name: &ColumnName) -> bool {
+    ENDS.iter().any(|word| name.has_word(word)) || (name.text.trim_end().ends_with('1') && is_time(name))
+}
+
+fn is_time(name: &ColumnName) -> bool {
+    name.meaning.is_some_and(|(quantity, _)| quantity == Quantity::Time)
+}
+
+/// The columns that are stamps of a motion by their names.
+fn stamps(heading: &Heading) -> Vec<usize> {
+    let names = heading.names();
+    let of_motion = |name: &ColumnName| {
+        name.meaning.is_none() && STARTS.iter().chain(&ENDS).any(|word| name.has_word(word))
+    };
+    (0..names.len()).filter(|i| is_time(&names[*i]) || of_motion(&names[*i])).collect()
+}
+
+/// Whether a heading names the two stamps of a relative motion.
+pub(super) fn names_motion(heading: &Heading) -> bool {
+    let names = heading.names();
+    let has = |words: &[&str]| names.iter().any(|n| n.meaning.is_none() && words.iter().any(|w| n.has_word(w)));
+    has(&STARTS) && has(&ENDS)
 }
