@@ -166,7 +166,10 @@ mod tests {
         // A description of a film with a bag in a folder below it.
         let below = || Claims("b", Probe::Collection(vec![PathBuf::from("x")]));
         assert_eq!(open(vec![Claims("a", Probe::Yes), below()], None, &none), "opened by a");
-        assert!(open(vec![Claims("a", Probe::Yes), below(), Claims("c", Probe::Yes)], None, &none).contains("more than"));
+        assert!(
+            open(vec![Claims("a", Probe::Yes), below(), Claims("c", Probe::Yes)], None, &none)
+                .contains("more than")
+        );
         let set = OpenOptions { settings: [("k".to_string(), "v".to_string())].into() };
         assert!(open(two(), Some("a"), &set).contains("no setting `k`"));
         let gone = Registry::new().detect(Path::new("no/such")).err().unwrap();

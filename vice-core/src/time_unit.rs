@@ -58,7 +58,9 @@ pub fn mixed_up(a: (&str, (Stamp, Stamp)), b: (&str, (Stamp, Stamp))) -> Option<
 pub fn own_start(fixed: (Stamp, Stamp), moved: (Stamp, Stamp)) -> Option<Span> {
     // From 1980 on, and less than a year and a half of running.
     let epoch = |range: (Stamp, Stamp)| range.0.as_nanos() >= 315_000_000_000_000_000;
-    let own = |range: (Stamp, Stamp)| range.0.as_nanos() >= -1_000_000_000 && range.1.as_nanos() < 50_000_000_000_000_000;
+    let own = |range: (Stamp, Stamp)| {
+        range.0.as_nanos() >= -1_000_000_000 && range.1.as_nanos() < 50_000_000_000_000_000
+    };
     ((epoch(fixed) && own(moved)) || (own(fixed) && epoch(moved))).then(|| fixed.0.since(moved.0))
 }
 
@@ -111,11 +113,16 @@ mod tests {
         assert_eq!((own_start(flight, flight), own_start(own, range(5, 10))), (None, None));
         let said = mixed_up(("poses", own), ("frames", flight)).unwrap();
         assert!(
-            said.contains("the poses count from their own start, the frames from 1970: 1403715273.262142976 s added"),
+            said.contains(
+                "the poses count from their own start, the frames from 1970: 1403715273.262142976 s added"
+            ),
             "{said}"
         );
         let said = mixed_up(("poses", flight), ("frames", own)).unwrap();
-        assert!(said.contains("the frames count from their own start") && said.contains("-1403715273.262"), "{said}");
+        assert!(
+            said.contains("the frames count from their own start") && said.contains("-1403715273.262"),
+            "{said}"
+        );
         assert!(suspect_unit(range(i64::MIN, i64::MIN), range(i64::MAX, i64::MAX)).is_none());
     }
 }

@@ -7,8 +7,8 @@ use csv::{Reader, ReaderBuilder, StringRecord};
 use vice_core::error::{DataError, DataResult};
 use vice_core::frames::WorldFromBody;
 use vice_core::imu::ImuSample;
-use vice_core::time::{Span, Stamp};
 use vice_core::suspicion::Suspicions;
+use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
 use vice_files::columns::TimeUnit;
 use vice_files::heading::TimeColumn;
@@ -150,7 +150,8 @@ mod tests {
     fn read_with_gaps() -> (Trajectory, Suspicions) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("p.csv");
-        std::fs::write(&path, "1,0,0,0,1,0,0,0\n2,nan,0,0,1,0,0,0\n3,0,0,0,1,0,0,0\n3,0,0,0,1,0,0,0\n").unwrap();
+        std::fs::write(&path, "1,0,0,0,1,0,0,0\n2,nan,0,0,1,0,0,0\n3,0,0,0,1,0,0,0\n3,0,0,0,1,0,0,0\n")
+            .unwrap();
         read_poses(&path).unwrap()
     }
 
@@ -168,7 +169,10 @@ mod tests {
             assert_eq!((found.start(), found.poses()[0]), (t.start(), t.poses()[0]), "{named}");
         }
         let (_, said) = read_with_gaps();
-        assert_eq!(said.into_iter().map(|s| s.code).collect::<Vec<_>>(), ["rows-left-out", "duplicate-stamps"]);
+        assert_eq!(
+            said.into_iter().map(|s| s.code).collect::<Vec<_>>(),
+            ["rows-left-out", "duplicate-stamps"]
+        );
         for (text, says) in [
             ("1,0,0,0,1,0,0,0,9\n", "p.csv:1: 9 columns, where the table has 8"),
             ("1,0,0,0,1,0,0\n", "p.csv:1: expected 8 columns, found 7"),

@@ -224,8 +224,12 @@ impl Dataset for Sequence {
         }
         list.extend(self.other_poses.iter().map(|table| {
             let shown = table.display().to_string();
-            Suspicion::new("poses-not-named", &shown, "looks like poses, and is not taken for the reference by itself")
-                .advice(format!("--reference {shown}"))
+            Suspicion::new(
+                "poses-not-named",
+                &shown,
+                "looks like poses, and is not taken for the reference by itself",
+            )
+            .advice(format!("--reference {shown}"))
         }));
         list.into_iter().collect()
     }
@@ -277,7 +281,8 @@ fn in_body(
 /// Tables in folders of sensors that are not known by name but hold poses.
 fn tables_of_poses(folder: &Path) -> Vec<PathBuf> {
     let folders = std::fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
-    let known = |name: &str| ["cam", "imu", "leica", "depth", "pointcloud"].iter().any(|k| name.starts_with(k));
+    let known =
+        |name: &str| ["cam", "imu", "leica", "depth", "pointcloud"].iter().any(|k| name.starts_with(k));
     let mut tables: Vec<PathBuf> = folders
         .filter(|f| !known(&f.file_name().to_string_lossy()))
         .map(|f| f.path().join("data.csv"))

@@ -55,7 +55,8 @@ impl EurocDepth {
         let path = listing.path(nearest)?;
         let bytes = image_file::read_bytes(&path)?;
         let scale = self.description.metres_per_count;
-        let image = image_file::decode_depth_png(&bytes, listing.stamps[nearest], scale).map_err(|e| e.at(path))?;
+        let image =
+            image_file::decode_depth_png(&bytes, listing.stamps[nearest], scale).map_err(|e| e.at(path))?;
         self.doubt.get_or_init(|| self.implausible(&image));
         Ok(Some(image))
     }
@@ -75,12 +76,16 @@ impl EurocDepth {
         let median = *valid.select_nth_unstable_by(middle, f32::total_cmp).1;
         (!(IMPLAUSIBLE_BELOW_M..=IMPLAUSIBLE_ABOVE_M).contains(&median)).then(|| {
             let file = self.folder.join(sensor::SENSOR_FILE);
-            Suspicion::new("depth-scale", file.display().to_string(), "depths are not those of a robot's scene")
-                .evidence(format!(
-                    "half of an image is beyond {median:.3} m at metres_per_count = {}",
-                    self.description.metres_per_count
-                ))
-                .advice("millimetres are 0.001, and 5000 counts a metre 0.0002")
+            Suspicion::new(
+                "depth-scale",
+                file.display().to_string(),
+                "depths are not those of a robot's scene",
+            )
+            .evidence(format!(
+                "half of an image is beyond {median:.3} m at metres_per_count = {}",
+                self.description.metres_per_count
+            ))
+            .advice("millimetres are 0.001, and 5000 counts a metre 0.0002")
         })
     }
 

@@ -68,12 +68,16 @@ impl Listing {
         // Where no picture is there at all, the pictures were left at home: labels need their stamps only.
         let some_missing = missing > 0 && missing < names.len() as u64;
         let suspicion = some_missing.then(|| {
-            Suspicion::new("pictures-missing", path.display().to_string(), "pictures that the list names are not there")
-                .evidence(format!(
-                    "{missing} of {}, the first is {}; their stamps are used all the same",
-                    names.len(),
-                    first_missing.unwrap_or_default()
-                ))
+            Suspicion::new(
+                "pictures-missing",
+                path.display().to_string(),
+                "pictures that the list names are not there",
+            )
+            .evidence(format!(
+                "{missing} of {}, the first is {}; their stamps are used all the same",
+                names.len(),
+                first_missing.unwrap_or_default()
+            ))
         });
         Ok(Self { stamps: stamps.into(), names, folder, suspicion })
     }
@@ -168,7 +172,9 @@ impl Columns {
             if heading.times().is_empty() {
                 // Not a heading, then: a first row that is broken.
                 let first = heading.names().first().map_or("", |n| n.text.as_str());
-                return Err(DataError::new(format!("column 1: `{first}` is no time stamp")).line(heading.line()));
+                return Err(
+                    DataError::new(format!("column 1: `{first}` is no time stamp")).line(heading.line())
+                );
             }
             if beginning.columns == 0 {
                 return Ok(by_place);

@@ -81,7 +81,8 @@ impl Heading {
 
     /// A comment as a heading, where a name in it is known.
     pub(crate) fn of_comment(text: &str, line: u64) -> Option<Self> {
-        let text = text.trim_start_matches(|c: char| c == '#' || c == '%' || c == '\u{feff}' || c.is_whitespace());
+        let text =
+            text.trim_start_matches(|c: char| c == '#' || c == '%' || c == '\u{feff}' || c.is_whitespace());
         let separator = match text {
             _ if text.contains(',') => Separator::Comma,
             _ if text.contains(';') => Separator::Semicolon,
@@ -273,7 +274,9 @@ mod tests {
             heading(";t;x;y;z;qx;qy;qz;qw;\n"),
             comment("# num t(s) x[m] y[m] z[m] q_x q_y q_z q_w"),
             comment("%num,time,tx [m],ty [m],tz [m],qx [],qy [],qz [],qw []"),
-            comment("#num timestamp [ns] p_RS_R_x [m] p_RS_R_y [m] p_RS_R_z [m] q_RS_x [] q_RS_y [] q_RS_z [] q_RS_w []"),
+            comment(
+                "#num timestamp [ns] p_RS_R_x [m] p_RS_R_y [m] p_RS_R_z [m] q_RS_x [] q_RS_y [] q_RS_z [] q_RS_w []",
+            ),
         ] {
             assert_eq!(heading.vector(Quantity::Position).unwrap(), Some([2, 3, 4]), "{heading:?}");
             assert_eq!(heading.quaternion().unwrap(), Some([8, 5, 6, 7]), "{heading:?}");

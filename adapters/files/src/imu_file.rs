@@ -119,7 +119,8 @@ fn by_names(heading: &Heading, row: &Row<'_>) -> DataResult<Option<Columns>> {
         return Ok(None);
     }
     let certain = !heading.is_commented() || heading.names().len() == row.len();
-    let found = (heading.vector(Quantity::AngularRate)?, heading.vector(Quantity::Acceleration)?, heading.time()?);
+    let found =
+        (heading.vector(Quantity::AngularRate)?, heading.vector(Quantity::Acceleration)?, heading.time()?);
     let (Some(gyro), Some(accel), Some(time)) = found else {
         if !certain {
             return Ok(None);
@@ -134,7 +135,10 @@ fn by_names(heading: &Heading, row: &Row<'_>) -> DataResult<Option<Columns>> {
     heading.check_width(row.len(), time.columns().chain(gyro).chain(accel))?;
     let names = heading.names();
     let unit = |column: usize, what: &str| {
-        heading.error(format!("`{}` is in {}, which is no {what} that is read", names[column].text, names[column].unit))
+        heading.error(format!(
+            "`{}` is in {}, which is no {what} that is read",
+            names[column].text, names[column].unit
+        ))
     };
     let rate = names[gyro[0]].radians_per_second().ok_or_else(|| unit(gyro[0], "rate of turn"))?;
     let acceleration = names[accel[0]].metres_per_second2().ok_or_else(|| unit(accel[0], "acceleration"))?;
@@ -162,11 +166,20 @@ fn implausible(samples: &[ImuSample], about: &str) -> Option<Suspicion> {
         Some(Suspicion::new("implausible-imu", about, message).evidence(&evidence).advice(advice))
     };
     if gravity(gyro) && accel < 5.0 {
-        say("the rates of turn look like accelerations", "are the accelerations first? Name the columns in a first line")
+        say(
+            "the rates of turn look like accelerations",
+            "are the accelerations first? Name the columns in a first line",
+        )
     } else if (0.85..1.15).contains(&accel) {
-        say("the accelerations look like multiples of gravity", "name their unit in a first line, such as accel_x [g]")
+        say(
+            "the accelerations look like multiples of gravity",
+            "name their unit in a first line, such as accel_x [g]",
+        )
     } else if gyro > 15.0 {
-        say("the rates of turn look like degrees a second", "name their unit in a first line, such as gyro_x [deg/s]")
+        say(
+            "the rates of turn look like degrees a second",
+            "name their unit in a first line, such as gyro_x [deg/s]",
+        )
     } else {
         None
     }
@@ -193,9 +206,14 @@ mod tests {
             let file = read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
             let sample = file.samples[0];
             assert_eq!(sample.stamp.as_nanos(), 1_000_000_000, "{text}");
-            assert_eq!((sample.gyro_rad_s, sample.accel_m_s2), (Vector3::new(1., 2., 3.), Vector3::new(4., 5., 6.)), "{text}");
+            assert_eq!(
+                (sample.gyro_rad_s, sample.accel_m_s2),
+                (Vector3::new(1., 2., 3.), Vector3::new(4., 5., 6.)),
+                "{text}"
+            );
         }
-        let g = read("t_ns,gx (deg/s),gy (deg/s),gz (deg/s),ax [g],ay [g],az [g]\n1,180,0,0,0,0,1\n").unwrap();
+        let g =
+            read("t_ns,gx (deg/s),gy (deg/s),gz (deg/s),ax [g],ay [g],az [g]\n1,180,0,0,0,0,1\n").unwrap();
         assert!((g.samples[0].gyro_rad_s.x - std::f64::consts::PI).abs() < 1e-12);
         assert_eq!(g.samples[0].accel_m_s2.z, 9.806_65);
     }
@@ -212,7 +230,9 @@ mod tests {
         says("t,gx,gyro_x,gy,gz,ax,ay,az\n1,1,1,2,3,4,5,6\n", "`gx` and `gyro_x`");
         says("t_ns,gx [rpm],gy [rpm],gz [rpm],ax,ay,az\n1,1,2,3,4,5,6\n", "in rpm, which is no rate");
         says("1,0,0,0,0,0,inf\n", "line 1: column 7: inf is not finite");
-        let file = read("1,0,0,0,0,0,9\n2,0,0,0,0,0,nan\n3,,,,,,\n3,0,0,0,0,0,9\n3,0,0,0,0,0,8\n4,0,0,0,0,0,9\n").unwrap();
+        let file =
+            read("1,0,0,0,0,0,9\n2,0,0,0,0,0,nan\n3,,,,,,\n3,0,0,0,0,0,9\n3,0,0,0,0,0,8\n4,0,0,0,0,0,9\n")
+                .unwrap();
         assert_eq!(file.samples.len(), 3);
         let codes: Vec<(String, u64)> = file.suspicions.into_iter().map(|s| (s.code, s.count)).collect();
         assert_eq!(codes, [("rows-left-out".to_string(), 2), ("duplicate-stamps".to_string(), 1)]);

@@ -91,10 +91,10 @@ impl Leniency {
                 self.duplicates.at(line);
                 Ok(Order::Again)
             }
-            Some(previous) if stamp < previous => Err(DataError::new(format!(
-                "stamp {stamp} ns is earlier than the one before, {previous} ns"
-            ))
-            .line(line)),
+            Some(previous) if stamp < previous => {
+                Err(DataError::new(format!("stamp {stamp} ns is earlier than the one before, {previous} ns"))
+                    .line(line))
+            }
             _ => Ok(Order::Later),
         }
     }
@@ -208,7 +208,13 @@ mod tests {
         let t = Stamp::from_nanos;
         assert_eq!(lenient.order(None, t(1), 1).unwrap(), Order::Later);
         assert_eq!(lenient.order(Some(t(1)), t(1), 7).unwrap(), Order::Again);
-        assert!(lenient.order(Some(t(2)), t(1), 8).unwrap_err().to_string().contains("line 8: stamp 1 ns is earlier"));
+        assert!(
+            lenient
+                .order(Some(t(2)), t(1), 8)
+                .unwrap_err()
+                .to_string()
+                .contains("line 8: stamp 1 ns is earlier")
+        );
         let q = lenient.quaternion([1.0011, 0.0, 0.0, 0.0], 9);
         assert_eq!(q, [1.0, 0.0, 0.0, 0.0]);
         assert_eq!(lenient.quaternion([1.0009, 0.0, 0.0, 0.0], 9)[0], 1.0009, "rounding is the core's");
@@ -240,7 +246,9 @@ mod tests {
             lenient.order((line > 1).then(Stamp::default), Stamp::default(), line).unwrap();
         }
         let error = lenient.check(1, "pose").unwrap_err().to_string();
-        assert!(error.contains("2 of 3 rows have the stamp of the row before") && error.contains("spreadsheet"));
+        assert!(
+            error.contains("2 of 3 rows have the stamp of the row before") && error.contains("spreadsheet")
+        );
     }
 
     #[test]

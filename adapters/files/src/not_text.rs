@@ -44,9 +44,9 @@ pub(crate) fn error(what: &str) -> DataError {
 
 /// The error of a folder where a file is expected.
 pub(crate) fn folder(path: &Path) -> DataError {
-    DataError::of_kind(ErrorKind::Unsupported, "is a folder, not a file").at(path).hint(
-        "of a data set write a stream to a file first: vice convert FOLDER --stream NAME --to tum OUT",
-    )
+    DataError::of_kind(ErrorKind::Unsupported, "is a folder, not a file")
+        .at(path)
+        .hint("of a data set write a stream to a file first: vice convert FOLDER --stream NAME --to tum OUT")
 }
 
 #[cfg(test)]
@@ -57,7 +57,10 @@ mod tests {
     fn recordings_and_archives_are_told_by_their_first_bytes() {
         let folder = tempfile::tempdir().unwrap();
         for (bytes, expected) in [
-            (&b"#ROSBAG V2.0\nxx"[..], "is a ROS 1 bag, not a table of text (write its poses to a file first"),
+            (
+                &b"#ROSBAG V2.0\nxx"[..],
+                "is a ROS 1 bag, not a table of text (write its poses to a file first",
+            ),
             (b"\x89MCAP0\r\n\x01", "is an MCAP recording"),
             (b"SQLite format 3\0\x10", "is an SQLite file"),
             (b"PK\x03\x04\x14", "unpack it first"),

@@ -84,13 +84,23 @@ impl VideoDataset {
         let folder = file.canonicalize().ok().and_then(|f| Some(f.parent()?.file_name()?.to_owned()));
         let folder = folder.map(|name| name.to_string_lossy().into_owned());
         let name = description.name.clone().or(folder).unwrap_or_else(|| "film".to_string());
-        Ok(Self { name, file, description, camera, body_from_camera, floor, film, suspicions: Mutex::default() })
+        Ok(Self {
+            name,
+            file,
+            description,
+            camera,
+            body_from_camera,
+            floor,
+            film,
+            suspicions: Mutex::default(),
+        })
     }
 
     fn suspect(&self, found: Suspicions) {
         let mut list = self.suspicions.lock().unwrap_or_else(PoisonError::into_inner);
         // A file that is read twice is not twice as wrong.
-        let fresh: Vec<Suspicion> = found.into_iter().filter(|s| !list.iter().any(|known| known == s)).collect();
+        let fresh: Vec<Suspicion> =
+            found.into_iter().filter(|s| !list.iter().any(|known| known == s)).collect();
         list.extend(fresh);
     }
 

@@ -147,7 +147,11 @@ mod tests {
         };
         let stamps = read("# ns\n1526182346402317409\r\n1526182346502317409\n").unwrap();
         assert_eq!(stamps[0], Stamp::from_nanos(1_526_182_346_402_317_409));
-        for named in ["timestamp [ns]\n1526182346402317409\n", "t\n1526182346402317409\n", "\u{feff}stamp_us\r\n1526182346402317.409\n"] {
+        for named in [
+            "timestamp [ns]\n1526182346402317409\n",
+            "t\n1526182346402317409\n",
+            "\u{feff}stamp_us\r\n1526182346402317.409\n",
+        ] {
             assert_eq!(read(named).unwrap()[..], stamps[..1], "{named}");
         }
         for (text, says) in [

@@ -8,6 +8,7 @@ use vice_core::conventions::{Given, cure, parse_list, suspect};
 use vice_core::metrics::align::{Alignment, align};
 use vice_core::metrics::associate::{Matching, PosePairs, crop};
 use vice_core::metrics::plane::Plane;
+use vice_core::metrics::quaternion_order;
 use vice_core::metrics::rpe::{Delta, DeltaUnit, PairMode, PairsFrom, Rpe, RpeErrors, RpeOptions};
 use vice_core::metrics::trajectory::{Ape, ApeErrors, Statistics, Summary};
 use vice_core::suspicion::{Suspicion, Suspicions};
@@ -147,8 +148,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     };
     let pairs = PosePairs::match_up(&reference, &estimate, matching, args.t_offset)
         .with_context(|| format!("{} against {}", args.estimate, args.reference))?;
-    if let Some(found) = suspect(&pairs, Given::default()) {
-        let suspicion = Suspicion::new("convention", &args.estimate, found.line());
+    let other = || suspect(&pairs, Given::default());
+    let suspicion = quaternion_order::suspicion(&pairs, &args.estimate)
+        .or_else(|| other().map(|found| Suspicion::new("convention", &args.estimate, found.line())));
+    if let Some(suspicion) = suspicion {
         tracing::warn!("{}", suspicion.line());
         suspicions.add(suspicion);
     }

@@ -75,7 +75,10 @@ impl DatasetArgs {
     ) -> anyhow::Result<UsedCamera> {
         let name = self.camera_name(dataset)?;
         let calibration = match calibration {
-            Some(file) => Some(file.for_camera(&name, &dataset.cameras()).map_err(|e| usage(format!("--calibration: {e}")))?),
+            Some(file) => Some(
+                file.for_camera(&name, &dataset.cameras())
+                    .map_err(|e| usage(format!("--calibration: {e}")))?,
+            ),
             None => None,
         };
         let calibration = calibration.as_ref();

@@ -10,6 +10,7 @@ use vice_core::evaluate::{Selection, Stream};
 use vice_core::frames::{Body, BodyFromCamera, Rigid, Sensor, WorldFromBody, WorldFromCamera};
 use vice_core::imu::{GRAVITY_Z_UP_M_S2, ImuSample, InertialState, fit_velocity};
 use vice_core::metrics::associate::{Matching, PosePairs};
+use vice_core::metrics::quaternion_order;
 use vice_core::metrics::rotation_offset::RotationOffset;
 use vice_core::result::Role;
 use vice_core::time::{Span, Stamp};
@@ -79,7 +80,8 @@ pub(crate) fn load_streams(
     calibration: Option<&CalibrationFile>,
     world_depth: bool,
 ) -> anyhow::Result<LoadedStreams> {
-    let time_offset = args.time_offset.or(calibration.and_then(|c| c.time_offset_of(&used.name))).unwrap_or(Span::ZERO);
+    let time_offset =
+        args.time_offset.or(calibration.and_then(|c| c.time_offset_of(&used.name))).unwrap_or(Span::ZERO);
     let mut loader = Loader { args, dataset, used, selection, time_offset, world_depth, reference: None };
     loader.reference = loader.load_reference()?;
     let mut list: Vec<Stream> = loader.reference.iter().cloned().collect();
@@ -318,6 +320,10 @@ fn warn_of_rotation(reference: &Stream, estimate: &Stream, max_gap: Span) {
     else {
         return;
     };
+    if let Some(suspicion) = quaternion_order::suspicion(&pairs, &estimate.name) {
+        tracing::warn!("{}", suspicion.line());
+        return;
+    }
     let Some(offset) = RotationOffset::find(&pairs).filter(RotationOffset::is_suspicious) else { return };
     let axis = offset.axis().unwrap_or_else(Vector3::z);
     tracing::warn!(

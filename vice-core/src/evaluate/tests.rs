@@ -206,7 +206,10 @@ fn poses_of_key_frames_only_are_said_to_be_sparse() {
         run(&labels, &[stream(Role::Reference, exact()), estimate], Window::default()).unwrap().suspicions
     };
     let sparse: Vec<_> = said(13).into_iter().collect();
-    assert_eq!((sparse.len(), sparse[0].code.as_str(), sparse[0].about.as_str()), (1, "sparse-poses", "estimate"));
+    assert_eq!(
+        (sparse.len(), sparse[0].code.as_str(), sparse[0].about.as_str()),
+        (1, "sparse-poses", "estimate")
+    );
     let line = sparse[0].line();
     assert!(line.contains("a pose every 0.65 s, --max-gap is 0.1 s; 36 of 40 frames lie in a gap"), "{line}");
     assert!(line.contains("the nearest pose 0.2 s away") && line.contains("--max-gap 0.7"), "{line}");

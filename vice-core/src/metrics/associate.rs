@@ -338,10 +338,19 @@ mod tests {
         assert!(error(&[t0 + 60_000_000_000]).contains("do not overlap in time"));
         assert!(error(&[t0 + 1_000_000_000]).contains("the two overlap"));
         let sparse = error(&[t0 + 1_000_000_000]);
-        assert!(sparse.contains("the reference has a pose every 2 s, the estimate once, and the nearest two are 1 s"), "{sparse}");
+        assert!(
+            sparse.contains(
+                "the reference has a pose every 2 s, the estimate once, and the nearest two are 1 s"
+            ),
+            "{sparse}"
+        );
         let own_start = error(&[0, 2_950_000_000]);
-        assert!(own_start.contains("counts from its own start") || own_start.contains("count from its own start"));
-        assert!(own_start.contains("an offset of 1403715278.000000000 s") && !own_start.contains("seconds read"));
+        assert!(
+            own_start.contains("counts from its own start") || own_start.contains("count from its own start")
+        );
+        assert!(
+            own_start.contains("an offset of 1403715278.000000000 s") && !own_start.contains("seconds read")
+        );
         // Times since the start: the range shows it, the epoch does not.
         let (r, e) = (at([100_000_000_000, 200_000_000_000]), at([100, 200]));
         let error = associate(&r, &e, Span::from_millis(10), Span::ZERO).unwrap_err().to_string();

@@ -5,6 +5,7 @@ pub mod associate;
 pub mod paired;
 pub mod pixel;
 pub mod plane;
+pub mod quaternion_order;
 pub mod rotation_offset;
 pub mod rpe;
 pub mod trajectory;

@@ -197,12 +197,18 @@ fn rounded(points: &[[f32; 3]], name: &str) -> Option<Suspicion> {
     let axes: Vec<String> = steps
         .iter()
         .filter(|(_, _, step)| coarse(*step))
-        .map(|(axis, largest, step)| format!("{} reaches {largest:.0} m and is known to {step} m", ["x", "y", "z"][*axis]))
+        .map(|(axis, largest, step)| {
+            format!("{} reaches {largest:.0} m and is known to {step} m", ["x", "y", "z"][*axis])
+        })
         .collect();
     Some(
-        Suspicion::new("cloud-precision", name, "coordinates this large are rounded in single precision (float)")
-            .evidence(axes.join(", "))
-            .advice("store the cloud in double precision, or subtract an offset from cloud and poses"),
+        Suspicion::new(
+            "cloud-precision",
+            name,
+            "coordinates this large are rounded in single precision (float)",
+        )
+        .evidence(axes.join(", "))
+        .advice("store the cloud in double precision, or subtract an offset from cloud and poses"),
     )
 }
 
@@ -302,14 +308,20 @@ mod tests {
             collector.finish("a.ply").unwrap().suspicions.iter().map(Suspicion::line).collect::<Vec<_>>()
         };
         let utm = said(&[[461_234.0, 5_428_765.0, 312.0]]);
-        assert!(utm[0].contains("x reaches 461234 m and is known to 0.03125 m, y reaches 5428765 m and is known to 0.5 m"), "{utm:?}");
+        assert!(
+            utm[0].contains(
+                "x reaches 461234 m and is known to 0.03125 m, y reaches 5428765 m and is known to 0.5 m"
+            ),
+            "{utm:?}"
+        );
         assert!(utm[0].contains("double precision") && !utm[0].contains("z reaches"));
         assert_eq!(said(&[[-461_234.0, 0.0, 0.0]]).len(), 1, "on either side of zero");
         assert!(said(&[[1000.0, -2000.0, 30.0]]).is_empty(), "a hall, or millimetres of a table");
         let mut double = Collector::new(&options(None, 1_000_000)).unwrap();
         double.double([461_234.0, 5_428_765.0, 312.0]).unwrap();
         double.double([461_235.5, 5_428_764.25, f64::NAN]).unwrap();
-        let codes: Vec<String> = double.finish("a.ply").unwrap().suspicions.into_iter().map(|s| s.code).collect();
+        let codes: Vec<String> =
+            double.finish("a.ply").unwrap().suspicions.into_iter().map(|s| s.code).collect();
         assert_eq!(codes, ["points-left-out"]);
     }
 }

@@ -240,11 +240,17 @@ fn byte_order_marks_are_passed_over_where_a_line_starts() {
         assert_eq!(read(text.as_bytes()).unwrap().single, rows, "{text:?}");
     }
     // Rows that are skipped, rows with lists, and rows of binary numbers behind a marked header.
-    let skipped = format!("ply\nformat ascii 1.0\nelement junk 1\nproperty int a\nelement vertex 2\n{XYZ}\nend_header\n{mark}7\n{mark}1 2 3\n4 5 6\n");
+    let skipped = format!(
+        "ply\nformat ascii 1.0\nelement junk 1\nproperty int a\nelement vertex 2\n{XYZ}\nend_header\n{mark}7\n{mark}1 2 3\n4 5 6\n"
+    );
     assert_eq!(read(skipped.as_bytes()).unwrap().single, rows);
-    let lists = format!("ply\nformat ascii 1.0\nelement vertex 2\nproperty list uchar int n\n{XYZ}\nend_header\n{mark}0 1 2 3\n{mark}1 9 4 5 6\n");
+    let lists = format!(
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty list uchar int n\n{XYZ}\nend_header\n{mark}0 1 2 3\n{mark}1 9 4 5 6\n"
+    );
     assert_eq!(read(lists.as_bytes()).unwrap().single, rows);
-    let mut binary = format!("{mark}ply\nformat binary_little_endian 1.0\nelement vertex 2\n{XYZ}\nend_header\n").into_bytes();
+    let mut binary =
+        format!("{mark}ply\nformat binary_little_endian 1.0\nelement vertex 2\n{XYZ}\nend_header\n")
+            .into_bytes();
     binary.extend(rows.as_flattened().iter().flat_map(|v| (*v as f32).to_le_bytes()));
     assert_eq!(read(&binary).unwrap().single, rows);
 }

@@ -49,7 +49,9 @@ pub(super) fn parse(text: &str) -> DataResult<CalibrationFile> {
             continue;
         };
         let mut entry = entry_of(map).map_err(|e| in_camera_kind(name, &e))?;
-        if entry.camera == CameraOverride::default() && entry.time_shift.is_none() && entry.camera_from_previous.is_none()
+        if entry.camera == CameraOverride::default()
+            && entry.time_shift.is_none()
+            && entry.camera_from_previous.is_none()
         {
             return Err(in_camera(name, &"says nothing about a camera"));
         }
@@ -83,13 +85,17 @@ fn add(file: &mut CalibrationFile, name: &str, entry: Entry) {
         let offset = Span::ZERO - shift;
         file.time_offsets.insert(name.to_string(), offset);
         file.said.push(
-            Suspicion::new("time-shift-applied", name, "timeshift_cam_imu is added to the stamps of the estimates")
-                .evidence(format!(
-                    "{} s, as --time-offset {} would",
-                    offset.to_seconds_text(),
-                    offset.to_seconds_text()
-                ))
-                .advice("--time-offset 0 leaves them as they are"),
+            Suspicion::new(
+                "time-shift-applied",
+                name,
+                "timeshift_cam_imu is added to the stamps of the estimates",
+            )
+            .evidence(format!(
+                "{} s, as --time-offset {} would",
+                offset.to_seconds_text(),
+                offset.to_seconds_text()
+            ))
+            .advice("--time-offset 0 leaves them as they are"),
         );
     }
     if let Some(topic) = entry.topic {
@@ -110,7 +116,9 @@ fn chain(name: &str, entry: &mut Entry, previous: Option<&(String, BodyFromCamer
     let chained: BodyFromCamera = *body_from_previous * camera_from_previous.inverse();
     match entry.camera.body_from_camera {
         None => entry.camera.body_from_camera = Some(chained),
-        Some(own) => same_place(&own, &chained, &format!("T_cn_cnm1 after {before}"), "the extrinsics of the camera")?,
+        Some(own) => {
+            same_place(&own, &chained, &format!("T_cn_cnm1 after {before}"), "the extrinsics of the camera")?
+        }
     }
     Ok(())
 }
@@ -145,7 +153,8 @@ fn in_camera_kind(name: &str, error: &DataError) -> DataError {
 }
 
 fn list(key: &str, value: &Value) -> DataResult<Vec<f64>> {
-    tree::numbers(value).ok_or_else(|| DataError::new(format!("is not the YAML expected: {key} is no list of numbers")))
+    tree::numbers(value)
+        .ok_or_else(|| DataError::new(format!("is not the YAML expected: {key} is no list of numbers")))
 }
 
 fn one(key: &str, value: &Value) -> DataResult<f64> {

@@ -131,14 +131,19 @@ impl CalibrationFile {
         }
         let entry = match self.entry_of(camera) {
             Some(entry) => Some(entry),
-            None if self.cameras.len() == 1 && (cameras.len() <= 1 || self.nameless) => self.cameras.keys().next(),
+            None if self.cameras.len() == 1 && (cameras.len() <= 1 || self.nameless) => {
+                self.cameras.keys().next()
+            }
             None => None,
         };
         let Some(entry) = entry.cloned() else {
             let known: Vec<&str> = self.cameras.keys().map(String::as_str).collect();
             return Err(DataError::of_kind(
                 ErrorKind::Contradictory,
-                format!("the file is of {}, the camera is {camera}; give its entry that name", known.join(", ")),
+                format!(
+                    "the file is of {}, the camera is {camera}; give its entry that name",
+                    known.join(", ")
+                ),
             )
             .at(&self.path));
         };

@@ -21,7 +21,9 @@ pub(super) fn read(text: &str) -> DataResult<Map<String, Value>> {
 
 fn from_xml(text: &str) -> DataResult<Value> {
     let document = Document::parse(text.trim_start_matches('\u{feff}')).map_err(|e| {
-        DataError::new(format!("is not the XML expected: {e}")).line(u64::from(e.pos().row)).hint(super::DIALECTS)
+        DataError::new(format!("is not the XML expected: {e}"))
+            .line(u64::from(e.pos().row))
+            .hint(super::DIALECTS)
     })?;
     Ok(of_node(&document.root_element()))
 }
@@ -29,10 +31,13 @@ fn from_xml(text: &str) -> DataResult<Value> {
 fn of_node(node: &Node<'_, '_>) -> Value {
     let children: Vec<Node<'_, '_>> = node.children().filter(Node::is_element).collect();
     if !children.is_empty() {
-        return Value::Object(children.iter().map(|c| (c.tag_name().name().to_string(), of_node(c))).collect());
+        return Value::Object(
+            children.iter().map(|c| (c.tag_name().name().to_string(), of_node(c))).collect(),
+        );
     }
     let text = node.text().unwrap_or_default().trim();
-    let numbers: Option<Vec<f64>> = text.split_whitespace().map(|w| w.trim_end_matches(',').parse().ok()).collect();
+    let numbers: Option<Vec<f64>> =
+        text.split_whitespace().map(|w| w.trim_end_matches(',').parse().ok()).collect();
     match numbers {
         Some(numbers) if numbers.len() > 1 => numbers.into(),
         Some(numbers) if numbers.len() == 1 => numbers[0].into(),

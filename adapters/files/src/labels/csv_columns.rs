@@ -45,8 +45,9 @@ impl Columns {
         let mut used = vec![false; names.len()];
         let mut find = |name: &str| -> DataResult<Option<usize>> {
             let known = NAMES.iter().find(|(n, _)| *n == name).map_or(&[][..], |(_, known)| known);
-            let found: Vec<usize> =
-                (0..names.len()).filter(|i| names[*i] == name || known.contains(&compact(names[*i]).as_str())).collect();
+            let found: Vec<usize> = (0..names.len())
+                .filter(|i| names[*i] == name || known.contains(&compact(names[*i]).as_str()))
+                .collect();
             match found[..] {
                 [] => Ok(None),
                 [only] => {
@@ -86,7 +87,8 @@ impl Columns {
         let keyframe = required("keyframe", find("keyframe")?)?;
         let (source, flags) = (find("source")?, find("flags")?);
         used[timestamp] = true;
-        let unknown = names.iter().zip(&used).filter(|(_, used)| !**used).map(|(n, _)| (*n).to_string()).collect();
+        let unknown =
+            names.iter().zip(&used).filter(|(_, used)| !**used).map(|(n, _)| (*n).to_string()).collect();
         let unit = columns[timestamp].time_unit();
         Ok(Self { point, timestamp, unit, u_px, v_px, keyframe, source, flags, unknown })
     }

@@ -55,7 +55,9 @@ pub fn read_csv_file(bytes: &[u8]) -> DataResult<LabelFile> {
         }
         rows += 1;
         lenient.row();
-        if let Some(digits) = rounded::digits_of_exponent_form(record.get(columns.timestamp).unwrap_or_default()) {
+        if let Some(digits) =
+            rounded::digits_of_exponent_form(record.get(columns.timestamp).unwrap_or_default())
+        {
             few += 1;
             most_digits = most_digits.max(digits);
         }
@@ -76,7 +78,8 @@ pub fn read_csv_file(bytes: &[u8]) -> DataResult<LabelFile> {
         return Err(rounded::error(most_digits).line(heading_line + 1));
     }
     lenient.check(kept, "pixel")?;
-    let labels = labels.finish().map_err(|e| if few > 0 { rounded::error(most_digits) } else { label_error(&e) })?;
+    let labels =
+        labels.finish().map_err(|e| if few > 0 { rounded::error(most_digits) } else { label_error(&e) })?;
     let mut file = LabelFile::of(labels);
     file.suspicions = lenient.suspicions("");
     if !columns.unknown.is_empty() {

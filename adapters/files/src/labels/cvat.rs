@@ -59,7 +59,8 @@ pub fn read_cvat_file(bytes: &[u8], frame_stamps: &[Stamp]) -> DataResult<LabelF
         return Err(DataError::new("these are CVAT's annotations of images, which have no tracks")
             .hint("export the task as `CVAT for video 1.1`"));
     }
-    let with_points: Vec<Node<'_, '_>> = tracks.iter().filter(|t| shapes(t).next().is_some()).copied().collect();
+    let with_points: Vec<Node<'_, '_>> =
+        tracks.iter().filter(|t| shapes(t).next().is_some()).copied().collect();
     let mut file = LabelFile::default();
     let frames = frame_map(&root, &with_points, frame_stamps.len(), &mut file)?;
     let mut uses: BTreeMap<&str, usize> = BTreeMap::new();
@@ -129,12 +130,7 @@ struct Reader<'r> {
 }
 
 impl Reader<'_> {
-    fn track(
-        &self,
-        track: &Node<'_, '_>,
-        lines: &mut Lines<'_>,
-        rows: &mut Vec<LabelRow>,
-    ) -> DataResult<()> {
+    fn track(&self, track: &Node<'_, '_>, lines: &mut Lines<'_>, rows: &mut Vec<LabelRow>) -> DataResult<()> {
         let made_by_tool = matches!(track.attribute("source"), Some("auto" | "semi-auto"));
         // Points that were visible before; of the others the next one starts a segment.
         let mut visible: BTreeSet<&str> = BTreeSet::new();
@@ -150,14 +146,16 @@ impl Reader<'_> {
                 visible.remove(label);
                 continue;
             }
-            let drawn = node.attribute("keyframe").is_none() || row.flag("keyframe").map_err(|e| e.line(line))?;
+            let drawn =
+                node.attribute("keyframe").is_none() || row.flag("keyframe").map_err(|e| e.line(line))?;
             let default_source = match (drawn, made_by_tool) {
                 (false, _) => ObservationSource::Interpolated,
                 (true, true) => ObservationSource::Auto,
                 (true, false) => ObservationSource::Manual,
             };
             let starts = visible.insert(label);
-            let observation = row.observation(self, default_source, starts, line).map_err(|e| e.line(line))?;
+            let observation =
+                row.observation(self, default_source, starts, line).map_err(|e| e.line(line))?;
             rows.push(LabelRow { point, observation });
         }
         Ok(())
@@ -208,12 +206,16 @@ impl Shape<'_, '_> {
         starts: bool,
         line: u64,
     ) -> DataResult<Observation> {
-        let frame = self.node.attribute("frame").or_else(|| self.holder.attribute("frame")).unwrap_or_default();
+        let frame =
+            self.node.attribute("frame").or_else(|| self.holder.attribute("frame")).unwrap_or_default();
         let number = frame.parse::<usize>().map_err(|_| self.wrong("the frame", frame, "a number"))?;
         let index = reader.frames.index(number).ok_or_else(|| {
             DataError::of_kind(
                 ErrorKind::Contradictory,
-                format!("point {}: frame {number} is none of the task's by its start_frame and step", self.point),
+                format!(
+                    "point {}: frame {number} is none of the task's by its start_frame and step",
+                    self.point
+                ),
             )
         })?;
         let stamp = *reader.frame_stamps.get(index).ok_or_else(|| {

@@ -53,7 +53,8 @@ pub(super) fn tasks(root: &Node<'_, '_>) -> DataResult<Vec<Task>> {
     let metas = root.children().filter(|n| n.has_tag_name("meta"));
     let nodes = metas.flat_map(|meta| meta.descendants()).filter(|n| {
         (n.has_tag_name("task") || n.has_tag_name("job"))
-            && n.parent().is_some_and(|p| p.has_tag_name("meta") || p.has_tag_name("tasks") || p.has_tag_name("jobs"))
+            && n.parent()
+                .is_some_and(|p| p.has_tag_name("meta") || p.has_tag_name("tasks") || p.has_tag_name("jobs"))
     });
     nodes.map(|node| task(&node)).collect()
 }
@@ -65,14 +66,21 @@ fn task(node: &Node<'_, '_>) -> DataResult<Task> {
     };
     let number = |name: &str| -> DataResult<Option<usize>> {
         let Some(value) = text(node, name) else { return Ok(None) };
-        value.parse().map(Some).map_err(|_| DataError::new(format!("<{name}> of the task is `{value}`, not a number")))
+        value
+            .parse()
+            .map(Some)
+            .map_err(|_| DataError::new(format!("<{name}> of the task is `{value}`, not a number")))
     };
     let filter = text(node, "frame_filter").unwrap_or_default();
     let step = match filter.split_once('=') {
         _ if filter.is_empty() => 1,
-        Some((key, step)) if key.trim() == "step" => step.trim().parse().ok().filter(|s| *s > 0).ok_or_else(|| {
-            DataError::new(format!("<frame_filter> of the task is `{filter}`, not step=2 or another number"))
-        })?,
+        Some((key, step)) if key.trim() == "step" => {
+            step.trim().parse().ok().filter(|s| *s > 0).ok_or_else(|| {
+                DataError::new(format!(
+                    "<frame_filter> of the task is `{filter}`, not step=2 or another number"
+                ))
+            })?
+        }
         _ => {
             return Err(DataError::of_kind(
                 ErrorKind::Unsupported,
@@ -131,7 +139,9 @@ pub(super) fn map(
         };
         let way = match camera_frames / size {
             n if n > 1 && camera_frames.div_ceil(n) == size && step == 1 => {
-                format!("; where every {n}. image was uploaded, write <frame_filter>step={n}</frame_filter> into its <task>")
+                format!(
+                    "; where every {n}. image was uploaded, write <frame_filter>step={n}</frame_filter> into its <task>"
+                )
             }
             _ => String::new(),
         };
@@ -154,8 +164,12 @@ pub(super) fn map(
         // The camera is the video.
         (true, in_doubt, true, _) => {
             let doubt = in_doubt.then(|| {
-                Suspicion::new("frame-numbers", "", "frame numbers were taken for those of the video, not of the task")
-                    .evidence(format!("start_frame {start}, step {step}; the numbers used fit both"))
+                Suspicion::new(
+                    "frame-numbers",
+                    "",
+                    "frame numbers were taken for those of the video, not of the task",
+                )
+                .evidence(format!("start_frame {start}, step {step}; the numbers used fit both"))
             });
             Ok((FrameMap::Same, doubt.filter(|_| step > 1 || start > 0)))
         }

@@ -141,9 +141,13 @@ proptest! {
 fn with_meta(meta: &str, frames: &[usize], task: &str) -> String {
     let points: String = frames
         .iter()
-        .map(|f| format!("<points frame=\"{f}\" keyframe=\"1\" outside=\"0\" occluded=\"0\" points=\"1,2\"/>"))
+        .map(|f| {
+            format!("<points frame=\"{f}\" keyframe=\"1\" outside=\"0\" occluded=\"0\" points=\"1,2\"/>")
+        })
         .collect();
-    format!("<annotations><meta>{meta}</meta><track id=\"0\" label=\"p\" source=\"manual\"{task}>{points}</track></annotations>")
+    format!(
+        "<annotations><meta>{meta}</meta><track id=\"0\" label=\"p\" source=\"manual\"{task}>{points}</track></annotations>"
+    )
 }
 
 #[test]
@@ -160,13 +164,20 @@ fn frame_numbers_are_the_cameras_or_refused() {
     let error = read(&task("<size>10</size>"), &[0, 9], "").unwrap_err();
     assert!(error.contains("the task has 10 frames, the camera 20") && error.contains("step=2"), "{error}");
     // As CVAT writes a video of every second frame, and as others do.
-    let stepped = task("<size>10</size><start_frame>0</start_frame><stop_frame>19</stop_frame><frame_filter>step=2</frame_filter>");
+    let stepped = task(
+        "<size>10</size><start_frame>0</start_frame><stop_frame>19</stop_frame><frame_filter>step=2</frame_filter>",
+    );
     assert_eq!(indices(read(&stepped, &[0, 2, 18], "").unwrap()), [0, 2, 18]);
     assert_eq!(indices(read(&stepped, &[0, 1, 9], "").unwrap()), [0, 2, 18]);
     let doubtful = read(&stepped, &[0, 2, 4], "").unwrap();
     assert!(doubtful.suspicions.iter().any(|s| s.code == "frame-numbers"));
     // A project's export, in which tracks name their task.
-    let project = |more: &str| format!("<project><id>1</id><name>both</name><tasks>{}{more}</tasks></project>", task("<size>20</size>"));
+    let project = |more: &str| {
+        format!(
+            "<project><id>1</id><name>both</name><tasks>{}{more}</tasks></project>",
+            task("<size>20</size>")
+        )
+    };
     assert_eq!(indices(read(&project(""), &[3], " task_id=\"7\"").unwrap()), [3]);
     let other = "<task><id>8</id><name>hall</name><size>90</size></task>";
     assert_eq!(indices(read(&project(other), &[3], " task_id=\"7\"").unwrap()), [3]);
@@ -196,15 +207,24 @@ fn points_of_skeletons_have_their_own_names() {
             usize::from(frame == 1)
         )
     };
-    let track = |id: usize| format!("<track id=\"{id}\" label=\"board\">{}{}{}</track>", skeleton(0, ""), skeleton(1, ""), skeleton(2, ""));
+    let track = |id: usize| {
+        format!(
+            "<track id=\"{id}\" label=\"board\">{}{}{}</track>",
+            skeleton(0, ""),
+            skeleton(1, ""),
+            skeleton(2, "")
+        )
+    };
     let read = |tracks: &str| {
-        let labels = read_cvat(format!("<annotations>{tracks}</annotations>").as_bytes(), &stamps(5)).unwrap();
+        let labels =
+            read_cvat(format!("<annotations>{tracks}</annotations>").as_bytes(), &stamps(5)).unwrap();
         let names: Vec<String> = labels.points().iter().map(|p| p.name.clone()).collect();
         (names, labels)
     };
     let (names, labels) = read(&track(0));
     assert_eq!(names, ["a", "b"]);
-    let b: Vec<(bool, bool)> = labels.points()[1].observations.iter().map(|o| (o.keyframe, o.occluded)).collect();
+    let b: Vec<(bool, bool)> =
+        labels.points()[1].observations.iter().map(|o| (o.keyframe, o.occluded)).collect();
     assert_eq!(b, [(true, true), (true, true)], "outside in between, so that it starts again");
     assert_eq!(labels.points()[0].observations.iter().filter(|o| o.keyframe).count(), 1);
     assert_eq!(read(&format!("{}{}", track(0), track(3))).0, ["a-0", "a-3", "b-0", "b-3"]);

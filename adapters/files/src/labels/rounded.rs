@@ -42,7 +42,8 @@ pub(super) fn check(labels: &LabelSet, frames: &[Stamp]) -> DataResult<()> {
     if of_labels < 2 || of_labels <= of_frames || !stamps().all(near) {
         return Ok(());
     }
-    let digits = stamps().map(|s| s.as_nanos().unsigned_abs().checked_ilog10().unwrap_or(0) + 1).max().unwrap_or(0);
+    let digits =
+        stamps().map(|s| s.as_nanos().unsigned_abs().checked_ilog10().unwrap_or(0) + 1).max().unwrap_or(0);
     Err(error(digits.saturating_sub(of_labels) as usize))
 }
 

@@ -284,7 +284,11 @@ fn columns_of_labels_have_other_names_and_units_too() {
         let file = read_csv_file(text.as_bytes()).unwrap_or_else(|e| panic!("{e}\n{text}"));
         let point = &file.labels.points()[0];
         let o = point.observations[0];
-        assert_eq!((point.name.as_str(), o.stamp.as_nanos(), o.px), ("a", 1_500_000_000, Pixel::new(1.5, 2.5)), "{text}");
+        assert_eq!(
+            (point.name.as_str(), o.stamp.as_nanos(), o.px),
+            ("a", 1_500_000_000, Pixel::new(1.5, 2.5)),
+            "{text}"
+        );
         assert_eq!(file.suspicions.iter().any(|s| s.evidence == "id_of_nothing"), text.contains("nothing"));
     }
     for (heading, expected) in [
@@ -300,9 +304,13 @@ fn columns_of_labels_have_other_names_and_units_too() {
 #[test]
 fn labels_without_a_pixel_are_gaps_and_rounded_stamps_are_named() {
     let head = "point,timestamp_ns,u_px,v_px,keyframe\n";
-    let file = read_csv_file(format!("{head}a,1,1,2,1\na,2,nan,NaN,0\na,3,NaN,1,0\na,4,1,2,0\n").as_bytes()).unwrap();
+    let file = read_csv_file(format!("{head}a,1,1,2,1\na,2,nan,NaN,0\na,3,NaN,1,0\na,4,1,2,0\n").as_bytes())
+        .unwrap();
     assert_eq!(file.labels.observation_count(), 2);
-    assert_eq!(file.suspicions.iter().map(|s| (s.code.as_str(), s.count)).collect::<Vec<_>>(), [("rows-left-out", 2)]);
+    assert_eq!(
+        file.suspicions.iter().map(|s| (s.code.as_str(), s.count)).collect::<Vec<_>>(),
+        [("rows-left-out", 2)]
+    );
     for rows in [
         "a,1.60000E+18,1,2,1\na,1.60000E+18,1,2,0\n",
         "a,1.60000E+18,1,2,1\nb,1.60000E+18,1,2,0\n",
@@ -313,7 +321,8 @@ fn labels_without_a_pixel_are_gaps_and_rounded_stamps_are_named() {
     }
     // Fifteen digits, and those of a double, beside the camera's frames.
     let folder = tempfile::tempdir().unwrap();
-    let frames: Vec<Stamp> = (0..5).map(|i| Stamp::from_nanos(1_403_715_280_562_142_976 + 50_000_064 * i)).collect();
+    let frames: Vec<Stamp> =
+        (0..5).map(|i| Stamp::from_nanos(1_403_715_280_562_142_976 + 50_000_064 * i)).collect();
     for (name, text, digits) in [
         ("a.csv", format!("{head}a,1403715280562140000,1,2,1\na,1403715280612140000,1,2,0\n"), 15),
         ("a.csv", format!("{head}a,1.40371528056214E+18,1,2,1\n"), 15),

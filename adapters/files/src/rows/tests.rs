@@ -12,8 +12,7 @@ fn all(text: &str) -> Vec<(u64, Vec<String>)> {
 
 #[test]
 fn every_usual_separator_is_understood() {
-    let expected =
-        |line, fields: &[&str]| (line, fields.iter().map(ToString::to_string).collect::<Vec<_>>());
+    let expected = |line, fields: &[&str]| (line, fields.iter().map(ToString::to_string).collect::<Vec<_>>());
     assert_eq!(
         all("\u{feff}# head\r\n\r\n1 2\t 3\r\n  # more\n4, 5 ,6,\n7;8\n9"),
         [

@@ -82,7 +82,10 @@ fn names_that_contradict_or_do_not_suffice_are_refused_with_the_facts() {
             match read_text("t.csv", &format!("{head}\n{row}\n")) {
                 Err(error) => {
                     let error = error.to_string();
-                    assert!(error.contains(expected) && error.contains("t.csv:"), "{error}\nexpected {expected}");
+                    assert!(
+                        error.contains(expected) && error.contains("t.csv:"),
+                        "{error}\nexpected {expected}"
+                    );
                 }
                 // A comment of another number of words may be prose.
                 Ok(_) => assert!(head.starts_with('#') && several, "{head}"),
@@ -91,7 +94,8 @@ fn names_that_contradict_or_do_not_suffice_are_refused_with_the_facts() {
     }
     let error = read_text("t.csv", "timestamp [s],tx,ty,tz,qx,qy,qz,qw\n1403715273262142976,1,2,3,0,0,0,1\n");
     assert!(error.unwrap_err().to_string().contains("look like nanoseconds; seconds are expected"));
-    let error = read_text("t.csv", &format!("timestamp,tx,ty,tz,qx,qy,qz,qw\n{row},9\n")).unwrap_err().to_string();
+    let error =
+        read_text("t.csv", &format!("timestamp,tx,ty,tz,qx,qy,qz,qw\n{row},9\n")).unwrap_err().to_string();
     assert!(error.contains("names 8 columns, the first row has 9"), "{error}");
 }
 
@@ -108,13 +112,23 @@ fn a_column_more_or_less_is_never_guessed_away() {
     says(&sixteen, &["16 columns, where EuRoC has 8 or 17"]);
     says(&sixteen.replace(",0\n", ",0,0,0\n"), &["18 columns"]);
     says("1 2 3 0 0 0 1\n", &["a row of 7 columns is no pose"]);
-    says("1.5 1 2 3 0 0 0 1\n1.6 1 2 3 0 0 0 1 9\n", &["t.txt:2: expected 8 columns as in the first row, found 9"]);
-    says("7 0 1.5 1 2 3 0 0 0 1\n", &["10 columns, where TUM has 8, and columns 5 to 8 are no unit quaternion"]);
+    says(
+        "1.5 1 2 3 0 0 0 1\n1.6 1 2 3 0 0 0 1 9\n",
+        &["t.txt:2: expected 8 columns as in the first row, found 9"],
+    );
+    says(
+        "7 0 1.5 1 2 3 0 0 0 1\n",
+        &["10 columns, where TUM has 8, and columns 5 to 8 are no unit quaternion"],
+    );
     says("1 2 3 4 5 6 7 8 9 10 11 12 13 14\n", &["14 columns"]);
     // More columns behind a pose are passed over, and it is said.
     let file = read_text("t.txt", "1.5 1 2 3 0.5 -0.5 0.1 0.7 9 9 9\n").unwrap();
     is_the_pose(&file, "eleven");
-    assert!(lines(&file)[0].contains("columns without names are passed over: 11 columns"), "{:?}", lines(&file));
+    assert!(
+        lines(&file)[0].contains("columns without names are passed over: 11 columns"),
+        "{:?}",
+        lines(&file)
+    );
 }
 
 #[test]
@@ -138,7 +152,10 @@ fn matrices_stand_behind_numbers_and_stamps() {
     write(format!("1 {matrix}\n3 {matrix}\n"));
     std::fs::write(folder.path().join("times.txt"), "10\n11\n12\n13.5\n").unwrap();
     let file = read(&path, &ReadOptions::default()).unwrap();
-    assert_eq!((file.trajectory.start().as_nanos(), file.trajectory.end().as_nanos()), (11_000_000_000, 13_500_000_000));
+    assert_eq!(
+        (file.trajectory.start().as_nanos(), file.trajectory.end().as_nanos()),
+        (11_000_000_000, 13_500_000_000)
+    );
     write(format!("1 {matrix}\n4 {matrix}\n"));
     let error = read(&path, &ReadOptions::default()).unwrap_err().to_string();
     assert!(error.contains("4 times for the number 4 of"), "{error}");
@@ -150,7 +167,10 @@ fn matrices_stand_behind_numbers_and_stamps() {
     ] {
         write(format!("{first} {matrix}\n{second} {matrix}\n"));
         let file = read(&path, &ReadOptions::default()).unwrap();
-        assert_eq!((file.trajectory.start().as_nanos(), file.trajectory.poses()[0].translation()), (nanos, at));
+        assert_eq!(
+            (file.trajectory.start().as_nanos(), file.trajectory.poses()[0].translation()),
+            (nanos, at)
+        );
     }
     // Whole matrices, and rows that are gaps keep their place among the times.
     write(format!("{matrix} 0 0 0 1\n{}\n{matrix} 0 0 0 1\n{matrix} 0 0 0 1\n", ["nan"; 16].join(" ")));
@@ -166,29 +186,44 @@ fn matrices_stand_behind_numbers_and_stamps() {
 #[test]
 fn what_the_field_writes_is_read_and_what_is_left_out_is_counted() {
     // Gaps in every spelling, with the stamp still in order.
-    for gap in ["NaN NaN NaN NaN NaN NaN NaN", "nan nan nan 0 0 0 1", "0 0 0 -nan -nan -nan -nan", "NaN(ind) 0 0 0 0 0 1"] {
+    for gap in [
+        "NaN NaN NaN NaN NaN NaN NaN",
+        "nan nan nan 0 0 0 1",
+        "0 0 0 -nan -nan -nan -nan",
+        "NaN(ind) 0 0 0 0 0 1",
+    ] {
         let text = format!("1 0 0 0 0 0 0 1\n2 {gap}\n3 {gap}\n4 0 0 0 0 0 0 1\n");
         let file = read_text("t.tum", &text).unwrap();
         assert_eq!(file.trajectory.len(), 2);
         let said = lines(&file);
-        assert!(said.len() == 1 && said[0].contains("NaN) are left out: 2 of 4 rows, the first on line 2"), "{said:?}");
+        assert!(
+            said.len() == 1 && said[0].contains("NaN) are left out: 2 of 4 rows, the first on line 2"),
+            "{said:?}"
+        );
     }
     let csv = "t_ns,x,y,z,qx,qy,qz,qw\n1,0,0,0,0,0,0,1\n2,,,,,,,\n3,null,null,null,null,null,null,null\n4,0,0,0,0,0,0,1\n";
     assert_eq!(read_text("t.csv", csv).unwrap().trajectory.len(), 2);
     let backwards = read_text("t.tum", "1 0 0 0 0 0 0 1\n3 nan 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n").unwrap_err();
     assert!(backwards.to_string().contains("t.tum:3: stamp 2000000000 ns is earlier"), "{backwards}");
     // A stamp twice: the first is kept.
-    let file = read_text("t.tum", "1 1 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n2 3 0 0 0 0 0 1\n4 4 0 0 0 0 0 1\n").unwrap();
+    let file =
+        read_text("t.tum", "1 1 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n2 3 0 0 0 0 0 1\n4 4 0 0 0 0 0 1\n").unwrap();
     let x: Vec<f64> = file.trajectory.poses().iter().map(|p| p.translation().x).collect();
     assert_eq!(x, [1.0, 2.0, 4.0]);
     assert!(lines(&file)[0].contains("left out: 1 of 4 rows, the first on line 3"), "{:?}", lines(&file));
     // Quaternions of few digits.
     let file = read_text("t.tum", "1 0 0 0 0 0 0 1.0011\n2 0 0 0 0 0 0 0.991\n3 0 0 0 0 0 0 1\n").unwrap();
-    assert!(lines(&file)[0].contains("scaled to it: 2 of 3 rows, the first on line 1, the length furthest off is 0.991"));
+    assert!(
+        lines(&file)[0]
+            .contains("scaled to it: 2 of 3 rows, the first on line 1, the length furthest off is 0.991")
+    );
     let beyond = read_text("t.tum", "1 0 0 0 0 0 0 1.011\n").unwrap_err().to_string();
     assert!(beyond.contains("t.tum:1: the quaternion has length 1.011"), "{beyond}");
     // Parts that were put together.
-    let file = read_text("t.tum", "\u{feff}# a\n1 0 0 0 0 0 0 1\n\u{feff}2 0 0 0 0 0 0 1\n\u{feff}# b\n3 0 0 0 0 0 0 1\n");
+    let file = read_text(
+        "t.tum",
+        "\u{feff}# a\n1 0 0 0 0 0 0 1\n\u{feff}2 0 0 0 0 0 0 1\n\u{feff}# b\n3 0 0 0 0 0 0 1\n",
+    );
     assert_eq!(file.unwrap().trajectory.len(), 3);
     // Relative motions by their names; a motion that is missing is no gap.
     let folder = tempfile::tempdir().unwrap();
@@ -207,14 +242,22 @@ fn what_the_field_writes_is_read_and_what_is_left_out_is_counted() {
         assert_eq!(file.trajectory.end().as_nanos(), 2_000_000_000, "{text}");
     }
     assert!(relative("1 2 nan 0 0 0 0 0 1\n").unwrap_err().contains("rel.csv:1: column 3: nan"));
-    assert!(relative("0 1 2 0 0 0 0 0 0 1\n").unwrap_err().contains("10 columns, where a relative motion has 9"));
-    assert!(relative("t0,tx,ty,tz,qw,qx,qy,qz,a\n1,2,-1,0,0,1,0,0,0\n").unwrap_err().contains("1 columns are named as stamps"));
+    assert!(
+        relative("0 1 2 0 0 0 0 0 0 1\n").unwrap_err().contains("10 columns, where a relative motion has 9")
+    );
+    assert!(
+        relative("t0,tx,ty,tz,qw,qx,qy,qz,a\n1,2,-1,0,0,1,0,0,0\n")
+            .unwrap_err()
+            .contains("1 columns are named as stamps")
+    );
 }
 
 #[test]
 fn lengths_that_cannot_be_metres_are_suspected() {
     let file = |scale: f64, head: &str| {
-        let rows: String = (0..20).map(|i| format!("{} {} 0 0 0 0 0 1\n", 0.05 * f64::from(i), f64::from(i) * scale)).collect();
+        let rows: String = (0..20)
+            .map(|i| format!("{} {} 0 0 0 0 0 1\n", 0.05 * f64::from(i), f64::from(i) * scale))
+            .collect();
         lines(&read_text("t.tum", &format!("{head}{rows}")).unwrap())
     };
     assert!(file(0.05, "").is_empty(), "1 m/s");
@@ -248,7 +291,11 @@ fn files_of_other_tools_are_read() {
         let Some(path) = shared(name) else { return };
         let file = read(&path, &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         let said = lines(&file);
-        assert_eq!((file.format, file.trajectory.len(), said.len()), (format, poses, suspicions), "{name}: {said:?}");
+        assert_eq!(
+            (file.format, file.trajectory.len(), said.len()),
+            (format, poses, suspicions),
+            "{name}: {said:?}"
+        );
     }
     let Some(path) = shared("idx13.txt") else { return };
     let file = read(&path, &ReadOptions { index_as_seconds: true, times: None }).unwrap();

@@ -87,7 +87,9 @@ fn by_names(heading: &Heading, row: &Row<'_>) -> DataResult<Option<PoseLayout>> 
         (Ok(Some(position)), Ok(Some(rotation))) => (position, rotation),
         (Err(error), _) | (_, Err(error)) => return if certain { Err(error) } else { Ok(None) },
         _ if !certain => return Ok(None),
-        (Ok(position), Ok(rotation)) => return Err(incomplete(heading, position.is_some(), rotation.is_some())),
+        (Ok(position), Ok(rotation)) => {
+            return Err(incomplete(heading, position.is_some(), rotation.is_some()));
+        }
     };
     if relative::names_motion(heading) {
         return Err(heading

@@ -97,7 +97,9 @@ impl MatrixCollector {
         let width = self.rows.width();
         row.expect_columns(width)?;
         if row.len() != width {
-            return Err(row.error(format!("expected {width} columns as in the first row, found {}", row.len())));
+            return Err(
+                row.error(format!("expected {width} columns as in the first row, found {}", row.len()))
+            );
         }
         self.seen += 1;
         if (self.rows.from..width).any(|c| row.is_nan(c)) {
@@ -153,7 +155,8 @@ fn own_stamps(firsts: &[String], lines: &[u64]) -> DataResult<Vec<Stamp>> {
 pub(super) fn with_times(path: &Path, found: MatrixPoses, options: &ReadOptions) -> DataResult<Trajectory> {
     let MatrixPoses { stamps, poses, lines, left_out } = found;
     if let MatrixStamps::Stamps(stamps) = stamps {
-        return Trajectory::from_poses(stamps.into_iter().zip(poses)).map_err(|e| at_line(&e, &lines).at(path));
+        return Trajectory::from_poses(stamps.into_iter().zip(poses))
+            .map_err(|e| at_line(&e, &lines).at(path));
     }
     let beside = path.with_file_name("times.txt");
     let times = match &options.times {
@@ -168,7 +171,8 @@ pub(super) fn with_times(path: &Path, found: MatrixPoses, options: &ReadOptions)
     };
     let Some(times) = times else {
         if options.index_as_seconds {
-            let seconds = |i: u64| Stamp::from_nanos(i64::try_from(i).unwrap_or(0).saturating_mul(1_000_000_000));
+            let seconds =
+                |i: u64| Stamp::from_nanos(i64::try_from(i).unwrap_or(0).saturating_mul(1_000_000_000));
             let stamped = places.into_iter().map(seconds).zip(poses);
             return Trajectory::from_poses(stamped).map_err(|e| at_line(&e, &lines).at(path));
         }
@@ -178,7 +182,8 @@ pub(super) fn with_times(path: &Path, found: MatrixPoses, options: &ReadOptions)
             .hint("put a file times.txt of seconds, one for each row, beside it, or convert it to TUM"));
     };
     let (stamps, time_lines) = read_times(&times).map_err(|e| e.at(&times))?;
-    let fits = if by_index { places.last().is_none_or(|i| *i < stamps.len() as u64) } else { stamps.len() == rows };
+    let fits =
+        if by_index { places.last().is_none_or(|i| *i < stamps.len() as u64) } else { stamps.len() == rows };
     if !fits {
         let of = match by_index {
             true => format!("the number {} of", places.last().copied().unwrap_or(0)),

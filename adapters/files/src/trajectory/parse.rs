@@ -49,7 +49,9 @@ pub struct PoseRows {
 pub fn read_micros_rows(path: &Path) -> DataResult<PoseRows> {
     let read = |rows| {
         let (collected, lenient) = gather(rows, Places::Blackbird)?;
-        let Collected::Poses(poses) = collected else { return Err(DataError::new("the rows have no stamps")) };
+        let Collected::Poses(poses) = collected else {
+            return Err(DataError::new("the rows have no stamps"));
+        };
         lenient.check(poses.poses.len(), "pose")?;
         let suspicions = lenient.suspicions(&path.display().to_string());
         Ok(PoseRows { rows: poses.poses, lines: poses.lines, suspicions })
@@ -150,7 +152,9 @@ impl PoseCollector {
         // Without names the columns beyond the eighth are nobody's.
         row.expect_width(if self.layout.passes_over { 8 } else { width })?;
         if row.len() == width + 1 {
-            return Err(row.error(format!("expected {width} columns as in the first row, found {}", row.len())));
+            return Err(
+                row.error(format!("expected {width} columns as in the first row, found {}", row.len()))
+            );
         }
         if row.len() > width {
             lenient.other_width(row.line());

@@ -113,20 +113,28 @@ fn by_names(heading: &Heading, row: &Row<'_>) -> DataResult<Option<Columns>> {
     let stamps = stamps(heading);
     let [a, b] = stamps[..] else {
         return Err(heading
-            .error(format!("{} columns are named as stamps, a relative motion has 2: {}", stamps.len(), heading.shown()))
+            .error(format!(
+                "{} columns are named as stamps, a relative motion has 2: {}",
+                stamps.len(),
+                heading.shown()
+            ))
             .hint("a relative motion is `t0 t1 tx ty tz qx qy qz qw`"));
     };
     let (from, to) = if is_end(&names[a]) && !is_end(&names[b]) { (b, a) } else { (a, b) };
     heading.check_width(row.len(), [from, to].into_iter().chain(position).chain(rotation))?;
     let metres = names[position[0]].metres().ok_or_else(|| {
-        heading.error(format!("`{}` is in {}, which is no length", names[position[0]].text, names[position[0]].unit))
+        heading.error(format!(
+            "`{}` is in {}, which is no length",
+            names[position[0]].text, names[position[0]].unit
+        ))
     })?;
     let time = |column: usize| TimeColumn::new(column, names[column].time_unit());
     Ok(Some(Columns { from: time(from), to: time(to), position, rotation, metres, width: row.len() }))
 }
 
 /// Words of the stamp at which a motion starts, and of the one at which it ends.
-const STARTS: [&str; 9] = ["t0", "time0", "stamp0", "timestamp0", "from", "start", "begin", "prev", "previous"];
+const STARTS: [&str; 9] =
+    ["t0", "time0", "stamp0", "timestamp0", "from", "start", "begin", "prev", "previous"];
 const ENDS: [&str; 8] = ["t1", "time1", "stamp1", "timestamp1", "to", "end", "next", "later"];
 
 fn is_end(name: &ColumnName) -> bool {
@@ -149,6 +157,7 @@ fn stamps(heading: &Heading) -> Vec<usize> {
 /// Whether a heading names the two stamps of a relative motion.
 pub(super) fn names_motion(heading: &Heading) -> bool {
     let names = heading.names();
-    let has = |words: &[&str]| names.iter().any(|n| n.meaning.is_none() && words.iter().any(|w| n.has_word(w)));
+    let has =
+        |words: &[&str]| names.iter().any(|n| n.meaning.is_none() && words.iter().any(|w| n.has_word(w)));
     has(&STARTS) && has(&ENDS)
 }

@@ -82,7 +82,10 @@ fn bad_rows_are_named() {
     says(&format!("{good}nan 0 0 0 0 0 0 1\n"), "t.txt:3: column 1");
     says(&format!("{good}inf 0 0 0 0 0 0 1\n"), "t.txt:3: column 1");
     says(&format!("{good}3 0 0 0 0 inf 0 1\n"), "t.txt:3: column 6: inf is not finite");
-    says("1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", "t.txt:2: stamp 1000000000 ns appears twice: 2 of 3");
+    says(
+        "1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n",
+        "t.txt:2: stamp 1000000000 ns appears twice: 2 of 3",
+    );
     says(&format!("{good}1.5 0 0 0 0 0 0 1\n"), "t.txt:3: stamp 1500000000 ns is earlier");
     says(&format!("{good}3 0 0 0 0 0 0 2\n"), "t.txt:3: the quaternion has length 2");
     says(&format!("{good}3 0 0 0 0 0 0 0\n"), "t.txt:3: the quaternion has length 0");
