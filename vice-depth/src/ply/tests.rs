@@ -230,7 +230,7 @@ proptest! {
 #[test]
 fn byte_order_marks_are_passed_over_where_a_line_starts() {
     let header = format!("format ascii 1.0\nelement vertex 2\n{XYZ}");
-    let rows = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]];
+    let rows: [[f32; 3]; 2] = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]];
     let mark = "\u{feff}";
     for text in [
         format!("{mark}ply\n{header}\nend_header\n1 2 3\n4 5 6\n"),
@@ -251,6 +251,6 @@ fn byte_order_marks_are_passed_over_where_a_line_starts() {
     let mut binary =
         format!("{mark}ply\nformat binary_little_endian 1.0\nelement vertex 2\n{XYZ}\nend_header\n")
             .into_bytes();
-    binary.extend(rows.as_flattened().iter().flat_map(|v| (*v as f32).to_le_bytes()));
+    binary.extend(rows.as_flattened().iter().flat_map(|v| v.to_le_bytes()));
     assert_eq!(read(&binary).unwrap().single, rows);
 }

@@ -228,7 +228,7 @@ fn what_the_field_writes_is_read_and_what_is_left_out_is_counted() {
     // Relative motions by their names; a motion that is missing is no gap.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("rel.csv");
-    let mut relative = |text: &str| {
+    let relative = |text: &str| {
         std::fs::write(&path, text).unwrap();
         read_relative(&path).map_err(|e| e.to_string())
     };
