@@ -23,9 +23,13 @@ impl Outputs {
             let shown = output.display();
             let place = place(output)?;
             if let Some(input) = inputs.iter().find(|i| place.starts_with(i)) {
-                let what =
-                    if input.is_dir() { "lies in the data that is read" } else { "is a file that is read" };
-                return Err(usage(format!("{shown} {what}: name another file")));
+                return Err(usage(match input.is_dir() {
+                    true => format!(
+                        "{shown} lies in the data that is read, {}: name a place outside of that folder",
+                        input.display()
+                    ),
+                    false => format!("{shown} is a file that is read: name another file"),
+                }));
             }
             if place.is_dir() {
                 return Err(usage(format!("{shown} is a folder: name a file")));

@@ -54,6 +54,10 @@ impl Registry {
             .map(|f| (f.as_ref(), f.probe(path)))
             .filter(|(_, probe)| *probe != Probe::No)
             .collect();
+        // A folder that is a data set is opened as one, also where data sets of another format lie below it.
+        if claims.iter().filter(|(_, probe)| *probe == Probe::Yes).count() == 1 {
+            claims.retain(|(_, probe)| *probe == Probe::Yes);
+        }
         match claims.len() {
             1 => Ok(claims.remove(0)),
             0 => Err(DataError::new("no format recognises this")
@@ -159,6 +163,13 @@ mod tests {
         assert!(open(two(), Some("c"), &none).contains("unknown format `c` (known: a, b)"));
         let many = Probe::Collection(vec![PathBuf::from("x"), PathBuf::from("y")]);
         assert!(open(vec![Claims("a", many)], None, &none).contains("a folder of a data sets (2 of them)"));
+        // A description of a film with a bag in a folder below it.
+        let below = || Claims("b", Probe::Collection(vec![PathBuf::from("x")]));
+        assert_eq!(open(vec![Claims("a", Probe::Yes), below()], None, &none), "opened by a");
+        assert!(
+            open(vec![Claims("a", Probe::Yes), below(), Claims("c", Probe::Yes)], None, &none)
+                .contains("more than")
+        );
         let set = OpenOptions { settings: [("k".to_string(), "v".to_string())].into() };
         assert!(open(two(), Some("a"), &set).contains("no setting `k`"));
         let gone = Registry::new().detect(Path::new("no/such")).err().unwrap();

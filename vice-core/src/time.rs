@@ -61,6 +61,14 @@ impl Stamp {
         parse_scaled(text, 9).map(Self)
     }
 
+    /// Reads decimal milliseconds exactly, rounding beyond the sixth decimal.
+    ///
+    /// # Errors
+    /// [`TimeError`] if the text is no decimal number or the value does not fit.
+    pub fn parse_millis(text: &str) -> Result<Self, TimeError> {
+        parse_scaled(text, 6).map(Self)
+    }
+
     /// Reads decimal microseconds exactly, rounding beyond the third decimal.
     ///
     /// # Errors
@@ -148,6 +156,13 @@ impl Span {
     /// The length without its sign, held at the end of the range.
     pub fn abs(self) -> Self {
         Self(self.0.saturating_abs())
+    }
+
+    /// Seconds with as many digits as a person wants to see in a message.
+    pub fn to_short_text(self) -> String {
+        let seconds = self.as_secs_f64();
+        let text = if seconds.abs() < 0.1 { format!("{seconds:.4}") } else { format!("{seconds:.2}") };
+        text.trim_end_matches('0').trim_end_matches('.').to_string()
     }
 
     /// The text form in seconds with nine decimals, exact.

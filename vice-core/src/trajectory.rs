@@ -235,6 +235,13 @@ impl Trajectory {
         self.stamps[self.stamps.len() - 1]
     }
 
+    /// The time between two poses, half of them closer; `None` for a single pose.
+    pub fn median_spacing(&self) -> Option<Span> {
+        let mut spans: Vec<Span> = self.stamps.windows(2).map(|w| w[1].since(w[0])).collect();
+        let middle = spans.len() / 2;
+        (!spans.is_empty()).then(|| *spans.select_nth_unstable(middle).1)
+    }
+
     /// The pose at `stamp`: linear in position, slerp in rotation, between neighbours at most `max_gap` apart.
     ///
     /// Costs a binary search.

@@ -72,7 +72,8 @@ pub fn compare_depths(request: &Request) -> RunResult<DepthComparison> {
     }
     let scene = Scene::open(&request.dataset, &request.streams.reference, request.streams.max_gap)?;
     let opened = &scene.opened;
-    let labels = request.labels.read(&opened.frames)?;
+    let (labels, suspicions) = request.labels.read(&opened.frames)?;
+    vice_files::leniency::log(&suspicions);
     let sources = request.depth.make_all(opened)?;
     let selection = Selection::new(&labels, &opened.frames, &opened.camera, &request.window())
         .context(|| request.labels.file.display().to_string())?;

@@ -3,6 +3,7 @@
 use vice_core::depth::DepthSource;
 use vice_core::evaluate::{EvaluateError, Evaluation, SampleSink, Selection, evaluate, evaluate_streaming};
 use vice_core::label::LabelSet;
+use vice_core::suspicion::Suspicions;
 use vice_core::time::Stamp;
 
 use crate::error::{Context, RunError, RunResult};
@@ -36,23 +37,25 @@ pub enum Samples<'a> {
 }
 
 impl LabelsSpec {
-    /// Reads the labels, or those of the chosen points.
+    /// Reads the labels, or those of the chosen points; and what looks wrong in them.
     ///
     /// # Errors
     /// [`RunError`] if the file cannot be read, or has not the points that are asked for.
-    pub fn read(&self, frames: &[Stamp]) -> RunResult<LabelSet> {
+    pub fn read(&self, frames: &[Stamp]) -> RunResult<(LabelSet, Suspicions)> {
         if self.file.as_os_str().is_empty() {
             return Err(RunError::usage("labels", "no file of labels is named"));
         }
-        let labels = vice_files::labels::read(&self.file, Some(frames))?;
+        let file = vice_files::labels::read_file(&self.file, Some(frames))?;
+        let labels = file.labels;
         tracing::info!("{} points with {} labels", labels.points().len(), labels.observation_count());
         if self.points.is_empty() {
-            return Ok(labels);
+            return Ok((labels, file.suspicions));
         }
-        labels.select(&self.points).map_err(|unknown| {
+        let chosen = labels.select(&self.points).map_err(|unknown| {
             let names: Vec<&str> = labels.points().iter().map(|p| p.name.as_str()).collect();
             RunError::usage("points", format!("there is no point {unknown}; there are {}", names.join(", ")))
-        })
+        })?;
+        Ok((chosen, file.suspicions))
     }
 }
 
@@ -104,7 +107,7 @@ impl Request {
         keep_samples: bool,
         work: impl FnOnce(&Evaluation<'_>, &LoadedStreams) -> RunResult<T>,
     ) -> RunResult<T> {
-        let labels = self.labels.read(&opened.frames)?;
+        let (labels, in_labels_file) = self.labels.read(&opened.frames)?;
         let in_labels = |error: EvaluateError| match error {
             EvaluateError::Data(error) => RunError::from(error),
             error => match Err::<(), _>(error).context(|| self.labels.file.display().to_string()) {
@@ -119,6 +122,7 @@ impl Request {
             return Err(EvaluateError::SubsetTooLarge { asked: *asked, points }.into());
         }
         let mut streams = self.streams.load(opened, &selection)?;
+        streams.suspicions.extend(in_labels_file.into_iter().chain(opened.suspicions()));
         for stream in &streams.list {
             let t = &stream.trajectory;
             tracing::info!("stream {}: {} poses, {} to {} ns", stream.name, t.len(), t.start(), t.end());

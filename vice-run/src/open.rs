@@ -8,6 +8,7 @@ use vice_core::error::ErrorKind;
 use vice_core::evaluate::Observations;
 use vice_core::frames::World;
 use vice_core::registry::Registry;
+use vice_core::suspicion::Suspicion;
 use vice_core::time::{Span, Stamp};
 use vice_files::calibration::CalibrationFile;
 
@@ -68,8 +69,11 @@ impl DatasetSpec {
     ) -> RunResult<Opened> {
         let name = self.camera_name(dataset.as_ref())?;
         let mut calibrated = Calibrated::new(Arc::clone(&dataset));
+        let calibration = calibration
+            .map(|file| file.for_camera(&name, &dataset.cameras()))
+            .transpose()
+            .map_err(|e| RunError::new(ErrorKind::Usage, "").because(e).of("calibration"))?;
         if let Some(file) = &calibration {
-            check_calibrated(file, &name)?;
             // The file may hold only extrinsics, or be all there is where the data set's own is broken.
             if let Some(camera) = file.camera(&name, dataset.camera(&name).ok().as_ref())? {
                 calibrated = calibrated.with_camera(&name, camera);
@@ -156,20 +160,13 @@ impl Protocol {
 }
 
 impl Opened {
+    /// What looked wrong in what was read beside the data set itself.
+    pub fn suspicions(&self) -> impl Iterator<Item = Suspicion> {
+        self.calibration.iter().flat_map(|file| file.suspicions().iter().cloned())
+    }
+
     /// Seconds that the calibration adds to the stamps of estimates, where it says so.
     pub fn calibrated_time_offset(&self) -> Option<Span> {
-        self.calibration.as_ref()?.time_offset
+        self.calibration.as_ref()?.time_offset_of(&self.camera_name)
     }
-}
-
-/// A file that says nothing about the camera in use is a mistake, unless all it holds is a clock offset.
-fn check_calibrated(file: &CalibrationFile, camera: &str) -> RunResult<()> {
-    if file.cameras().is_empty() || file.cameras().contains_key(camera) {
-        return Ok(());
-    }
-    let known: Vec<&str> = file.cameras().keys().map(String::as_str).collect();
-    Err(RunError::usage(
-        "calibration",
-        format!("the file is of {}, the camera is {camera}; give its entry that name", known.join(", ")),
-    ))
 }

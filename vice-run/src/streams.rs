@@ -11,6 +11,7 @@ use vice_core::diagnose::InertialRun;
 use vice_core::evaluate::{Selection, Stream};
 use vice_core::frames::{Body, Rigid, Sensor, WorldFromBody, WorldFromCamera};
 use vice_core::metrics::associate::{Matching, PosePairs};
+use vice_core::metrics::quaternion_order;
 use vice_core::metrics::rotation_offset::RotationOffset;
 use vice_core::result::Role;
 use vice_core::suspicion::{Suspicion, Suspicions};
@@ -192,6 +193,7 @@ impl Loader<'_> {
         if read.format == TrajectoryFormat::Kitti {
             self.formats.insert("kitti");
         }
+        self.suspicions.extend(read.suspicions);
         Ok(read.trajectory)
     }
 
@@ -342,6 +344,9 @@ fn turned_body(reference: &Stream, estimate: &Stream, max_gap: Span) -> Option<S
     let matching = Matching::Interpolate { max_gap };
     let pairs =
         PosePairs::match_up(&reference.trajectory, &estimate.trajectory, matching, Span::ZERO).ok()?;
+    if let Some(order) = quaternion_order::suspicion(&pairs, &estimate.name) {
+        return Some(order);
+    }
     let offset = RotationOffset::find(&pairs).filter(RotationOffset::is_suspicious)?;
     let axis = offset.axis().unwrap_or_else(Vector3::z);
     Some(

@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
-use vice_core::conventions::{Convention, Given, cure};
+use vice_core::conventions::{Convention, Given, cure, suspect};
 use vice_core::metrics::align::{Alignment, ReferenceFromEstimate, align};
 use vice_core::metrics::associate::{Matching, PosePairs, crop};
 use vice_core::metrics::plane::Plane;
+use vice_core::metrics::quaternion_order;
 use vice_core::metrics::rpe::{Delta, DeltaUnit, PairMode, PairsFrom, Rpe, RpeErrors, RpeOptions};
 use vice_core::metrics::trajectory::{Ape, ApeErrors, Statistics, Summary};
-use vice_core::suspicion::Suspicions;
+use vice_core::suspicion::{Suspicion, Suspicions};
 use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
 use vice_files::trajectory::{ReadOptions, TrajectoryFormat, read_spec};
@@ -156,12 +157,16 @@ pub fn compare_trajectories(request: &TrajectoryRequest) -> RunResult<Compared> 
     let delta =
         Delta::new(request.delta, request.delta_unit).map_err(|e| RunError::usage("delta", e.to_string()))?;
     let matching = request.matching()?;
-    let (reference, estimate) = request.read_both()?;
+    let Both { reference, estimate, mut suspicions } = request.read_both()?;
     let names = (request.reference.to_string(), request.estimate.to_string());
     // As evo: what the reference no longer has is not matched either.
-    let reference = crop(&reference, request.t_start, request.t_end).context(|| names.0.clone())?;
-    let pairs = PosePairs::match_up(&reference, &estimate, matching, request.t_offset)
-        .context(|| format!("{} against {}", names.1, names.0))?;
+    let pairs = crop(&reference, request.t_start, request.t_end).context(|| names.0.clone()).and_then(|r| {
+        PosePairs::match_up(&r, &estimate, matching, request.t_offset)
+            .context(|| format!("{} against {}", names.1, names.0))
+    });
+    // What was read may be why nothing fits.
+    let pairs = pairs.inspect_err(|_| vice_files::leniency::log(&suspicions))?;
+    suspicions.extend(suspected(&pairs, &names.1));
     let transform = align(&pairs, request.align, request.n_to_align)
         .context(|| format!("alignment {} of {}", request.align.name(), names.1))?;
     let mut pairs = transform.apply_to(&pairs);
@@ -195,9 +200,23 @@ pub fn compare_trajectories(request: &TrajectoryRequest) -> RunResult<Compared> 
         ape: ApeErrors::of(&pairs).statistics()?,
         rpe,
         rpe_problem,
-        suspicions: Suspicions::new(),
+        suspicions,
     };
     Ok(Compared { document, estimate_poses: estimate.len(), pairs, transform })
+}
+
+/// Both trajectories, and what looked wrong when they were read.
+struct Both {
+    reference: Trajectory,
+    estimate: Trajectory,
+    suspicions: Suspicions,
+}
+
+/// Another convention that fits the reference far better than the one that the estimate was read in.
+fn suspected(pairs: &PosePairs, estimate: &str) -> Option<Suspicion> {
+    quaternion_order::suspicion(pairs, estimate).or_else(|| {
+        suspect(pairs, Given::default()).map(|found| Suspicion::new("convention", estimate, found.line()))
+    })
 }
 
 impl TrajectoryRequest {
@@ -223,7 +242,7 @@ impl TrajectoryRequest {
     }
 
     /// Two KITTI files without times are compared row by row; one alone has no clock to compare by.
-    fn read_both(&self) -> RunResult<(Trajectory, Trajectory)> {
+    fn read_both(&self) -> RunResult<Both> {
         let read = |spec: &EstimateSpec, index_as_seconds| {
             read_spec(&spec.to_string(), &ReadOptions { times: self.times.clone(), index_as_seconds })
         };
@@ -243,9 +262,11 @@ impl TrajectoryRequest {
             (_, TrajectoryFormat::Kitti) => estimate = read(&self.estimate, false)?,
             _ => {}
         }
+        let mut suspicions = reference.suspicions;
+        suspicions.extend(estimate.suspicions);
         let estimate = cure(&self.estimate_as, &estimate.trajectory, Given::default())
             .map_err(|e| RunError::from(e).of("estimate-as"))?;
-        Ok((reference.trajectory, estimate))
+        Ok(Both { reference: reference.trajectory, estimate, suspicions })
     }
 }
 

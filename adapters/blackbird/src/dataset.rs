@@ -9,6 +9,7 @@ use vice_core::dataset::{Dataset, DepthImage, Fact, Floor, GROUND_TRUTH, Image, 
 use vice_core::error::{DataError, DataResult};
 use vice_core::frames::{BodyFromCamera, World};
 use vice_core::imu::{ImuSample, InertialState};
+use vice_core::suspicion::{Suspicion, Suspicions};
 use vice_core::time::{Span, Stamp};
 use vice_core::time_unit::unit_mixup;
 use vice_core::trajectory::Trajectory;
@@ -32,6 +33,8 @@ pub(crate) struct BlackbirdDataset {
     depths: Vec<(Side, DepthFrames)>,
     initial_velocity_m_s: Option<Vector3<f64>>,
     truth: OnceLock<Trajectory>,
+    /// What was left out of the ground truth.
+    suspicions: OnceLock<Suspicions>,
     imu: OnceLock<Arc<[ImuSample]>>,
     floor: OnceLock<Plane<World>>,
 }
@@ -64,6 +67,7 @@ impl BlackbirdDataset {
             depths,
             initial_velocity_m_s,
             truth: OnceLock::new(),
+            suspicions: OnceLock::new(),
             imu: OnceLock::new(),
             floor: OnceLock::new(),
         })
@@ -89,8 +93,9 @@ impl BlackbirdDataset {
             return Ok(truth);
         }
         let path = self.flight.join(POSES);
-        let truth = tables::read_poses(&path)?;
+        let (truth, suspicions) = tables::read_poses(&path)?;
         self.check_clock(&path, (truth.start(), truth.end()))?;
+        let _ = self.suspicions.set(suspicions);
         Ok(self.truth.get_or_init(|| truth))
     }
 
@@ -119,6 +124,10 @@ fn flight_name(flight: &Path) -> String {
 impl Dataset for BlackbirdDataset {
     fn name(&self) -> &str {
         &self.name
+    }
+
+    fn suspicions(&self) -> Vec<Suspicion> {
+        self.suspicions.get().into_iter().flat_map(|list| list.iter().cloned()).collect()
     }
 
     fn format(&self) -> &str {

@@ -7,46 +7,43 @@ use csv::{Reader, ReaderBuilder, StringRecord};
 use vice_core::error::{DataError, DataResult};
 use vice_core::frames::WorldFromBody;
 use vice_core::imu::ImuSample;
+use vice_core::suspicion::Suspicions;
 use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
-use vice_files::rows::{self, Row};
+use vice_files::columns::TimeUnit;
+use vice_files::heading::TimeColumn;
+use vice_files::rows;
+use vice_files::trajectory::read_micros_rows;
 
 use crate::ned;
 
-/// Reads `groundTruthPoses.csv`: µs, x, y, z, qw, qx, qy, qz.
+/// Reads `groundTruthPoses.csv`: µs, x, y, z, qw, qx, qy, qz, or what a heading names; and what was left out.
 ///
 /// # Errors
-/// [`DataError`] with path and line for a row that is no pose, is too short, or is not later than the one before.
-pub(crate) fn read_poses(path: &Path) -> DataResult<Trajectory> {
-    let mut poses: Vec<(Stamp, WorldFromBody)> = Vec::new();
-    let mut rows = rows::open(path)?;
-    let mut read = || {
-        while let Some(row) = rows.next_row()? {
-            let (stamp, pose) = read_pose(&row)?;
-            if let Some((previous, _)) = poses.last().filter(|(previous, _)| *previous >= stamp) {
-                return Err(
-                    row.error(format!("stamp {stamp} ns is not later than the one before, {previous} ns"))
-                );
-            }
-            poses.push((stamp, pose));
-        }
-        Ok(())
-    };
-    read().map_err(|e: DataError| e.at(path))?;
-    Trajectory::from_poses(poses).map_err(|e| DataError::new(e.to_string()).at(path))
+/// [`DataError`] with path and line for a row that is no pose, is too short, or is earlier than the one before.
+pub(crate) fn read_poses(path: &Path) -> DataResult<(Trajectory, Suspicions)> {
+    let found = read_micros_rows(path).map_err(|e| match e.problem().contains("does not fit") {
+        true => e.hint("microseconds are expected; nanoseconds of today do not fit"),
+        false => e,
+    })?;
+    let mut poses: Vec<(Stamp, WorldFromBody)> = Vec::with_capacity(found.rows.len());
+    for (row, line) in found.rows.iter().zip(&found.lines) {
+        let pose = ned::pose(row.position_m, row.rotation_wxyz)
+            .map_err(|e| DataError::new(e.to_string()).line(*line).at(path))?;
+        poses.push((row.stamp, pose));
+    }
+    let trajectory = Trajectory::from_poses(poses).map_err(|e| DataError::new(e.to_string()).at(path))?;
+    Ok((trajectory, found.suspicions))
 }
 
 /// The stamp of the first pose only, to see which clock a flight is on without reading it all.
 pub(crate) fn first_pose_stamp(path: &Path) -> Option<Stamp> {
-    rows::open(path).ok()?.next_row().ok()??.micros(0).ok()
-}
-
-fn read_pose(row: &Row<'_>) -> DataResult<(Stamp, WorldFromBody)> {
-    row.expect_columns(8)?;
-    let stamp =
-        row.micros(0).map_err(|e| e.hint("microseconds are expected; nanoseconds of today do not fit"))?;
-    let pose = ned::pose(row.numbers(1)?, row.numbers(4)?).map_err(|e| row.error(e.to_string()))?;
-    Ok((stamp, pose))
+    let mut rows = rows::open(path).ok()?;
+    let beginning = rows.begin().ok()?;
+    let heading = beginning.heading.as_ref().or(beginning.comments.first());
+    let named = heading.and_then(|h| h.time().ok().flatten());
+    let mut time = named.unwrap_or_else(|| TimeColumn::new(0, Some(TimeUnit::Micros)));
+    time.stamp(&rows.next_row().ok()??).ok()
 }
 
 /// Columns of `blackbird_slash_imu.csv` that are read, counted from 0.
@@ -147,7 +144,15 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("p.csv");
         std::fs::write(&path, text).unwrap();
-        read_poses(&path)
+        read_poses(&path).map(|(poses, _)| poses)
+    }
+
+    fn read_with_gaps() -> (Trajectory, Suspicions) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p.csv");
+        std::fs::write(&path, "1,0,0,0,1,0,0,0\n2,nan,0,0,1,0,0,0\n3,0,0,0,1,0,0,0\n3,0,0,0,1,0,0,0\n")
+            .unwrap();
+        read_poses(&path).unwrap()
     }
 
     #[test]
@@ -155,11 +160,25 @@ mod tests {
         let t = poses("1526182346200000,1,2,-3,1,0,0,0\n1526182346205556,1,2,-3,1,0,0,0\n").unwrap();
         assert_eq!(t.start().as_nanos(), 1_526_182_346_200_000_000);
         assert_eq!(t.poses()[0].translation(), Vector3::new(1.0, -2.0, 3.0));
+        for named in [
+            "timestamp [us],x,y,z,qw,qx,qy,qz\n1526182346200000,1,2,-3,1,0,0,0\n",
+            "# qx qy qz qw px py pz t_s\n0 0 0 1 1 2 -3 1526182346.2\n",
+            "seq;time;pos_x;pos_y;pos_z;q_x;q_y;q_z;q_w\n7;1526182346200000000;1;2;-3;0;0;0;1\n",
+        ] {
+            let found = poses(named).unwrap();
+            assert_eq!((found.start(), found.poses()[0]), (t.start(), t.poses()[0]), "{named}");
+        }
+        let (_, said) = read_with_gaps();
+        assert_eq!(
+            said.into_iter().map(|s| s.code).collect::<Vec<_>>(),
+            ["rows-left-out", "duplicate-stamps"]
+        );
         for (text, says) in [
+            ("1,0,0,0,1,0,0,0,9\n", "p.csv:1: 9 columns, where the table has 8"),
             ("1,0,0,0,1,0,0\n", "p.csv:1: expected 8 columns, found 7"),
-            ("1,0,0,0,1,0,0,0\n1,0,0,0,1,0,0,0\n", "p.csv:2: stamp 1000 ns is not later"),
+            ("1,0,0,0,1,0,0,0\n1,0,0,0,1,0,0,0\n", "p.csv:2: stamp 1000 ns appears twice"),
             ("1,0,0,0,2,0,0,0\n", "p.csv:1: the quaternion has length 2"),
-            ("1,nan,0,0,1,0,0,0\n", "p.csv:1: column 2: nan is not finite"),
+            ("1,nan,0,0,1,0,0,0\n", "p.csv:1: none of the 1 rows has a pose"),
             ("1526182346200000000,0,0,0,1,0,0,0\n", "microseconds are expected"),
             ("", "no poses"),
         ] {

@@ -8,6 +8,7 @@ use vice_core::dataset::{CloudRef, CloudSource, Dataset, DepthImage, Fact, GROUN
 use vice_core::error::{DataError, DataResult};
 use vice_core::frames::{Body, BodyFromCamera, Sensor};
 use vice_core::imu::{ImuSample, InertialState};
+use vice_core::suspicion::{Suspicion, Suspicions};
 use vice_core::time::Stamp;
 use vice_core::trajectory::Trajectory;
 use vice_files::trajectory::{self, TrajectoryFile};
@@ -20,7 +21,7 @@ use crate::{NAME, inertial, sensor};
 /// Folder of the ground truth.
 pub(crate) const GROUND_TRUTH_FOLDER: &str = "state_groundtruth_estimate0";
 /// Sensors that give whole poses, the better one first. `leica0` has no rotation.
-const POSE_FOLDERS: [&str; 2] = [GROUND_TRUTH_FOLDER, "vicon0"];
+const POSE_FOLDERS: [&str; 3] = [GROUND_TRUTH_FOLDER, "vicon0", "mocap0"];
 
 /// An opened sequence.
 pub(crate) struct Sequence {
@@ -29,7 +30,9 @@ pub(crate) struct Sequence {
     cameras: Vec<EurocCamera>,
     truth_folder: Option<PathBuf>,
     truth: OnceLock<TrajectoryFile>,
-    imu: OnceLock<Arc<[ImuSample]>>,
+    imu: OnceLock<(Arc<[ImuSample]>, Suspicions)>,
+    /// Other folders whose tables look like poses.
+    other_poses: Vec<PathBuf>,
     depth: Option<EurocDepth>,
 }
 
@@ -53,6 +56,10 @@ impl Sequence {
                 .at(&folder)
                 .hint("a folder cam0 with data.csv and sensor.yaml is expected"));
         }
+        let other_poses = match POSE_FOLDERS.iter().any(|name| folder.join(name).is_dir()) {
+            true => Vec::new(),
+            false => tables_of_poses(&folder),
+        };
         let truth_folder = POSE_FOLDERS.iter().map(|name| folder.join(name)).find(|p| p.is_dir());
         let depth_folder = folder.join("depth0");
         let depth = if depth_folder.is_dir() { Some(EurocDepth::open(depth_folder)?) } else { None };
@@ -70,6 +77,7 @@ impl Sequence {
             truth_folder,
             truth: OnceLock::new(),
             imu: OnceLock::new(),
+            other_poses,
             depth,
         })
     }
@@ -123,7 +131,7 @@ impl Dataset for Sequence {
     }
 
     fn camera(&self, camera: &str) -> DataResult<Camera> {
-        Ok(self.find(camera)?.calibration()?.camera)
+        self.find(camera)?.intrinsics()
     }
 
     fn frames(&self, camera: &str) -> DataResult<Arc<[Stamp]>> {
@@ -164,13 +172,13 @@ impl Dataset for Sequence {
             return Ok(Arc::new([]));
         }
         let samples = cached(&self.imu, || {
-            let samples = inertial::samples(&folder)?;
+            let (samples, suspicions) = inertial::samples(&folder)?;
             if let [first, .., last] = &samples[..] {
                 self.check_unit(&folder.join("data.csv"), (first.stamp, last.stamp))?;
             }
-            Ok(samples)
+            Ok((samples, suspicions))
         })?;
-        Ok(Arc::clone(samples))
+        Ok(Arc::clone(&samples.0))
     }
 
     fn inertial_state(&self, stamp: Stamp) -> DataResult<Option<InertialState>> {
@@ -203,6 +211,29 @@ impl Dataset for Sequence {
         Ok(Some(CloudRef { source: CloudSource::Ply(ply), world_from_cloud }))
     }
 
+    fn suspicions(&self) -> Vec<Suspicion> {
+        let mut list: Suspicions = self.cameras.iter().flat_map(EurocCamera::suspicions).collect();
+        if let Some(truth) = self.truth.get() {
+            list.extend(truth.suspicions.iter().cloned());
+        }
+        if let Some((_, suspicions)) = self.imu.get() {
+            list.extend(suspicions.iter().cloned());
+        }
+        if let Some(depth) = &self.depth {
+            list.extend(depth.suspicions());
+        }
+        list.extend(self.other_poses.iter().map(|table| {
+            let shown = table.display().to_string();
+            Suspicion::new(
+                "poses-not-named",
+                &shown,
+                "looks like poses, and is not taken for the reference by itself",
+            )
+            .advice(format!("--reference {shown}"))
+        }));
+        list.into_iter().collect()
+    }
+
     fn facts(&self) -> Vec<Fact> {
         let mut facts = Vec::new();
         let mut add = |text: String| facts.push(Fact { section: "sensors".into(), text });
@@ -219,6 +250,9 @@ impl Dataset for Sequence {
                 Ok(count) => add(format!("depth0: {count} images registered to {}", depth.camera())),
                 Err(error) => add(format!("depth0: {error}")),
             }
+        }
+        for table in &self.other_poses {
+            add(format!("{}: looks like poses; name it with --reference", table.display()));
         }
         if self.folder.join("leica0").is_dir() {
             add("leica0: positions without rotation, not used".into());
@@ -242,6 +276,20 @@ fn in_body(
         file.inertial = None;
     }
     file
+}
+
+/// Tables in folders of sensors that are not known by name but hold poses.
+fn tables_of_poses(folder: &Path) -> Vec<PathBuf> {
+    let folders = std::fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+    let known =
+        |name: &str| ["cam", "imu", "leica", "depth", "pointcloud"].iter().any(|k| name.starts_with(k));
+    let mut tables: Vec<PathBuf> = folders
+        .filter(|f| !known(&f.file_name().to_string_lossy()))
+        .map(|f| f.path().join("data.csv"))
+        .filter(|table| trajectory::looks_like_poses(table))
+        .collect();
+    tables.sort();
+    tables
 }
 
 /// The sequence's name: its folder's, also where `mav0` or `.` was given.

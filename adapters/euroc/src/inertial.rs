@@ -3,14 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use nalgebra::Vector3;
 use vice_core::error::{DataError, DataResult};
 use vice_core::imu::{ImuSample, InertialState};
+use vice_core::suspicion::Suspicions;
 use vice_core::time::{Span, Stamp};
-use vice_files::rows;
+use vice_files::imu_file;
 use vice_files::trajectory::{InertialRow, TrajectoryFile};
 
-use crate::listing::check_order;
 use crate::sensor;
 
 /// Widest gap between rows of the ground truth across which its state is interpolated.
@@ -20,7 +19,7 @@ const MAX_GAP: Span = Span::from_millis(100);
 ///
 /// The body of EuRoC is its IMU, so this is the identity there. A lever arm would need the angular acceleration, which
 /// no sensor gives: it is refused.
-pub(crate) fn samples(folder: &Path) -> DataResult<Arc<[ImuSample]>> {
+pub(crate) fn samples(folder: &Path) -> DataResult<(Arc<[ImuSample]>, Suspicions)> {
     let body_from_sensor = sensor::body_from_sensor(folder)?;
     let lever_m = body_from_sensor.translation().norm();
     if lever_m > 1e-3 {
@@ -29,24 +28,16 @@ pub(crate) fn samples(folder: &Path) -> DataResult<Arc<[ImuSample]>> {
             .hint("the body is expected to be the IMU"));
     }
     let path = folder.join("data.csv");
-    let read = || {
-        let mut rows = rows::open(&path)?;
-        let mut samples: Vec<ImuSample> = Vec::new();
-        while let Some(row) = rows.next_row()? {
-            row.expect_columns(7)?;
-            let stamp = row.nanos(0)?;
-            check_order(samples.last().map(|s| s.stamp), stamp).map_err(|e| e.line(row.line()))?;
-            let gyro: Vector3<f64> = row.numbers(1)?.into();
-            let accel: Vector3<f64> = row.numbers(4)?.into();
-            samples.push(ImuSample {
-                stamp,
-                gyro_rad_s: body_from_sensor.rotate(&gyro),
-                accel_m_s2: body_from_sensor.rotate(&accel),
-            });
-        }
-        if samples.is_empty() { Err(DataError::new("the list holds no samples")) } else { Ok(samples.into()) }
+    let file = imu_file::read(&path)?;
+    if file.samples.is_empty() {
+        return Err(DataError::new("the list holds no samples").at(&path));
+    }
+    let turned = |s: &ImuSample| ImuSample {
+        stamp: s.stamp,
+        gyro_rad_s: body_from_sensor.rotate(&s.gyro_rad_s),
+        accel_m_s2: body_from_sensor.rotate(&s.accel_m_s2),
     };
-    read().map_err(|e| e.at(&path))
+    Ok((file.samples.iter().map(turned).collect(), file.suspicions))
 }
 
 /// Pose, velocity and biases at a stamp: of the row there, or linear between its neighbours.

@@ -2,9 +2,9 @@
 //!
 //! ```text
 //! SEQUENCE/mav0/                        the sequence's folder or mav0 itself is what is opened
-//!   cam0/data.csv  sensor.yaml  data/   frames: `ns,file name`; cam1 … alike
+//!   cam0/data.csv  sensor.yaml  data/   frames: `ns,file name`; cam1 … alike; columns by their names where a heading has them
 //!   imu0/data.csv  sensor.yaml          ns, gyro rad/s, accel m/s²; turned into the body frame by its T_BS
-//!   state_groundtruth_estimate0/data.csv   17 columns; else vicon0 with 8
+//!   state_groundtruth_estimate0/data.csv   17 columns; else vicon0 or mocap0 with 8
 //!   pointcloud0/data.ply  sensor.yaml   the scan; T_WR (world from scan) where it is not the world's
 //!   depth0/data.csv  sensor.yaml  data/ depth images registered to a camera: not of the original data sets
 //! ```
@@ -80,5 +80,7 @@ fn mav_folder(path: &Path) -> Option<PathBuf> {
     has_sensor.then(|| path.to_path_buf())
 }
 
+#[cfg(test)]
+mod dialect_tests;
 #[cfg(test)]
 mod tests;

@@ -5,54 +5,53 @@ use std::path::Path;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use vice_core::camera::{Camera, Model};
-use vice_core::error::{DataError, DataResult};
+use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::frames::{Body, BodyFromCamera, Cloud, Rigid, Sensor, World};
+use vice_core::suspicion::Suspicions;
+use vice_files::calibration::{CalibrationFile, CameraOverride};
 use vice_files::rigid_file::Matrix4;
 use vice_files::yaml;
 
 /// Name of the file in a sensor's folder.
 pub(crate) const SENSOR_FILE: &str = "sensor.yaml";
 
-#[derive(Deserialize)]
-struct CameraFile {
-    #[serde(rename = "T_BS")]
-    t_bs: Option<Matrix4>,
-    resolution: Option<[u32; 2]>,
-    camera_model: Option<String>,
-    intrinsics: Option<[f64; 4]>,
-    distortion_model: Option<String>,
-    #[serde(alias = "distortion_coeffs")]
-    distortion_coefficients: Option<Vec<f64>>,
-}
-
 /// Intrinsics and extrinsics of a camera.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Calibration {
     pub(crate) camera: Camera,
     pub(crate) body_from_camera: BodyFromCamera,
+    /// Keys of the file that are not used.
+    pub(crate) suspicions: Suspicions,
 }
 
 /// Reads the calibration in a camera's folder.
 pub(crate) fn calibration(folder: &Path) -> DataResult<Calibration> {
     let path = folder.join(SENSOR_FILE);
-    let file: CameraFile = yaml::read(&path)?;
-    calibration_of(file).map_err(|e| e.at(&path))
+    let file = CalibrationFile::read(&path)?;
+    let [(name, found)] = file.cameras().iter().collect::<Vec<_>>()[..] else {
+        return Err(DataError::new("describes more than one camera").at(&path));
+    };
+    if let Some(offset) = file.time_offset_of(name) {
+        return Err(DataError::of_kind(
+            ErrorKind::Unsupported,
+            "timeshift_cam_imu is not applied to the stamps of a data set",
+        )
+        .at(&path)
+        .hint(format!("take it out and give --time-offset {} instead", offset.to_seconds_text())));
+    }
+    let (camera, body_from_camera) = calibration_of(found).map_err(|e| e.at(&path))?;
+    Ok(Calibration { camera, body_from_camera, suspicions: file.suspicions().clone() })
 }
 
-fn calibration_of(file: CameraFile) -> DataResult<Calibration> {
+fn calibration_of(found: &CameraOverride) -> DataResult<(Camera, BodyFromCamera)> {
     let missing = |key: &str| DataError::new(format!("`{key}` is missing"));
-    let [width, height] = file.resolution.ok_or_else(|| missing("resolution"))?;
-    let intrinsics = file.intrinsics.ok_or_else(|| missing("intrinsics"))?;
-    if let Some(model) = file.camera_model.filter(|model| model != "pinhole") {
-        return Err(DataError::new(format!("unknown camera_model `{model}`; known: pinhole")));
-    }
-    let distortion = file.distortion_model.as_deref().unwrap_or("none");
-    let coefficients = file.distortion_coefficients.unwrap_or_default();
-    let model = Model::from_name(distortion, &coefficients);
+    let [width, height] = found.resolution.ok_or_else(|| missing("resolution"))?;
+    let intrinsics = found.intrinsics.ok_or_else(|| missing("intrinsics"))?;
+    let lens = found.model.as_deref().unwrap_or("none");
+    let model = Model::from_name(lens, found.distortion.as_deref().unwrap_or_default());
     let camera = model.and_then(|model| Camera::new(width, height, intrinsics, model));
     let camera = camera.map_err(|e| DataError::new(e.to_string()))?;
-    let body_from_camera = file.t_bs.ok_or_else(|| missing("T_BS"))?.to_rigid("T_BS")?;
-    Ok(Calibration { camera, body_from_camera })
+    Ok((camera, found.body_from_camera.ok_or_else(|| missing("T_BS"))?))
 }
 
 #[derive(Deserialize)]

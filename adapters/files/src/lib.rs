@@ -7,15 +7,24 @@
 //! | [`calibration`] | TOML or Kalibr files that override intrinsics and extrinsics |
 //! | [`rigid_file`] | the place of an estimate's frame in the body |
 //! | [`image_file`] | PNG and JPEG |
-//! | [`rows`], [`yaml`] | text in rows, and YAML with OpenCV's dialect |
+//! | [`imu_file`] | inertial samples in a table |
+//! | [`rows`], [`heading`], [`columns`] | text in rows, and which column holds what by its name |
+//! | [`yaml`] | YAML with OpenCV's dialect |
+//! | [`leniency`] | what readers repair or leave out, one rule for all |
+//! | [`not_text`] | recordings and archives given where text is expected |
 //! | [`paths`] | names from files, kept below their folder |
 //! | [`atomic`] | writing all or nothing |
 #![forbid(unsafe_code)]
 
 pub mod atomic;
 pub mod calibration;
+pub mod columns;
+pub mod heading;
 pub mod image_file;
+pub mod imu_file;
 pub mod labels;
+pub mod leniency;
+pub mod not_text;
 pub mod paths;
 pub mod rigid_file;
 pub mod rows;

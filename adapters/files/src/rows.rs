@@ -1,17 +1,25 @@
 //! Rows of separated text, one at a time: the reader under trajectories and sensor lists.
 //!
 //! A line is split at commas where it has any, else at semicolons, else at white space. Blank lines and lines that
-//! start with `#` are skipped; a byte-order mark and CRLF are accepted. One buffer is reused for all rows.
+//! start with `#` or `%` are skipped; a byte-order mark wherever a line starts and CRLF are accepted. One buffer is
+//! reused for all rows. [`Rows::begin`] finds the names of the columns, in a first row or in a comment above it.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-use vice_core::error::{DataError, DataResult};
+use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::time::{Stamp, TimeError};
+
+use crate::heading::Heading;
+use crate::not_text;
 
 /// Bytes beyond which a line is not text in rows.
 const MAX_LINE_BYTES: usize = 1 << 16;
+/// Comments above the first row that may be its heading: the last of them.
+const MAX_COMMENTS: usize = 16;
+/// U+FEFF in UTF-8.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Reads rows from text.
 #[derive(Debug)]
@@ -20,6 +28,24 @@ pub struct Rows<R> {
     buffer: Vec<u8>,
     fields: Vec<(u32, u32)>,
     line: u64,
+    /// The row in the buffer is still to be given out.
+    pending: bool,
+    /// Comments so far, until a row was given out.
+    comments: Vec<(u64, String)>,
+    given: bool,
+}
+
+/// What stands above the first row of numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Beginning {
+    /// A first row of names, which some tools write without `#`.
+    pub heading: Option<Heading>,
+    /// Comments that may be such a row, the nearest to the rows first.
+    pub comments: Vec<Heading>,
+    /// Columns of the first row; 0 where there is none.
+    pub columns: usize,
+    /// Line of the first row; 0 where there is none.
+    pub line: u64,
 }
 
 /// One row. It borrows the reader's buffer.
@@ -55,15 +81,50 @@ pub fn open(path: impl AsRef<Path>) -> DataResult<Rows<BufReader<File>>> {
     };
     let file = File::open(path).map_err(failed)?;
     if file.metadata().map_err(failed)?.is_dir() {
-        return Err(DataError::new("is a folder, not a file").at(path));
+        return Err(not_text::folder(path));
     }
-    Ok(Rows::new(BufReader::with_capacity(1 << 18, file)))
+    let mut reader = BufReader::with_capacity(1 << 18, file);
+    match not_text::what(reader.fill_buf().map_err(failed)?) {
+        Some(what) => Err(not_text::error(what).at(path)),
+        None => Ok(Rows::new(reader)),
+    }
 }
 
 impl<R: BufRead> Rows<R> {
     /// Reads from any source.
     pub fn new(reader: R) -> Self {
-        Self { reader, buffer: Vec::new(), fields: Vec::new(), line: 0 }
+        Self {
+            reader,
+            buffer: Vec::new(),
+            fields: Vec::new(),
+            line: 0,
+            pending: false,
+            comments: Vec::new(),
+            given: false,
+        }
+    }
+
+    /// Looks for names of columns above the first row of numbers, and leaves that row to [`Rows::next_row`].
+    ///
+    /// To be called before anything else.
+    ///
+    /// # Errors
+    /// As [`Rows::next_row`].
+    pub fn begin(&mut self) -> DataResult<Beginning> {
+        let mut beginning = Beginning { heading: None, comments: Vec::new(), columns: 0, line: 0 };
+        while let Some(row) = self.next_row()? {
+            match Heading::of_row(&row) {
+                Some(found) if beginning.heading.is_none() => beginning.heading = Some(found),
+                _ => {
+                    (beginning.columns, beginning.line) = (row.len(), row.line());
+                    self.pending = true;
+                    break;
+                }
+            }
+        }
+        let read = |(line, text): &(u64, String)| Heading::of_comment(text, *line);
+        beginning.comments = self.comments.iter().rev().filter_map(read).collect();
+        Ok(beginning)
     }
 
     /// The next row, `None` at the end.
@@ -72,9 +133,10 @@ impl<R: BufRead> Rows<R> {
     /// [`DataError`] with the line if it is not UTF-8, far too long, or cannot be read. The path is the caller's to add.
     pub fn next_row(&mut self) -> DataResult<Option<Row<'_>>> {
         // In two steps, since a row borrows the buffer that the search for it fills.
-        if !self.advance()? {
+        if !std::mem::take(&mut self.pending) && !self.advance()? {
             return Ok(None);
         }
+        self.given = true;
         let ends = self.buffer.last() == Some(&b'\n');
         let text = text_of(&self.buffer, self.line)?;
         let separator = split(text, &mut self.fields);
@@ -98,13 +160,30 @@ impl<R: BufRead> Rows<R> {
                     DataError::new("the line is longer than 64 KiB: this is no text in rows").line(self.line)
                 );
             }
-            if self.line == 1 && self.buffer.starts_with(b"\xef\xbb\xbf") {
-                self.buffer.drain(..3);
+            // Files that were put together have a mark where each part begins.
+            if self.buffer.starts_with(BYTE_ORDER_MARK) {
+                self.buffer.drain(..BYTE_ORDER_MARK.len());
             }
-            let first = self.buffer.iter().find(|b| !b.is_ascii_whitespace());
-            if first.is_some_and(|b| *b != b'#') {
-                return Ok(true);
+            match self.buffer.iter().find(|b| !b.is_ascii_whitespace()) {
+                None => {}
+                Some(b'#' | b'%') => self.keep_comment(),
+                Some(_) => return Ok(true),
             }
+        }
+    }
+}
+
+impl<R> Rows<R> {
+    /// Remembers a comment that may name the columns; only what comes before the first row can.
+    fn keep_comment(&mut self) {
+        if self.given {
+            return;
+        }
+        if let Ok(text) = std::str::from_utf8(&self.buffer) {
+            if self.comments.len() == MAX_COMMENTS {
+                self.comments.remove(0);
+            }
+            self.comments.push((self.line, text.trim().to_string()));
         }
     }
 }
@@ -112,7 +191,7 @@ impl<R: BufRead> Rows<R> {
 fn text_of(buffer: &[u8], line: u64) -> DataResult<&str> {
     std::str::from_utf8(buffer)
         .map(|text| text.trim_matches(|c: char| c.is_ascii_whitespace()))
-        .map_err(|_| DataError::new("the line is not UTF-8 text").line(line))
+        .map_err(|_| DataError::of_kind(ErrorKind::Corrupt, "the line is not UTF-8 text").line(line))
 }
 
 /// Finds the fields of a trimmed, non-empty line as byte ranges.
@@ -199,6 +278,15 @@ impl<'a> Row<'a> {
         Err(self.error(format!("expected {expected} columns, found {}{cut}", self.len())))
     }
 
+    /// Checks that there are at least `expected` columns, an empty last one included, which ends with its separator.
+    ///
+    /// # Errors
+    /// As [`Row::expect_columns`].
+    pub fn expect_width(&self, expected: usize) -> DataResult<()> {
+        let empty_last = self.len() + 1 == expected && self.text.ends_with([',', ';']);
+        if empty_last { Ok(()) } else { self.expect_columns(expected) }
+    }
+
     /// A finite number.
     ///
     /// # Errors
@@ -255,6 +343,30 @@ impl<'a> Row<'a> {
         Stamp::parse_nanos(text).map_err(|e| self.no_time(column, text, e))
     }
 
+    /// Whether a field is NaN, in whatever spelling.
+    pub fn is_nan(&self, column: usize) -> bool {
+        self.field(column).is_some_and(|text| {
+            text.trim_start_matches(['-', '+']).get(..3).is_some_and(|word| word.eq_ignore_ascii_case("nan"))
+        })
+    }
+
+    /// Whether a field is empty or one of the words that tables have for no value.
+    pub fn is_missing(&self, column: usize) -> bool {
+        self.is_nan(column)
+            || self.field(column).is_none_or(|text| {
+                ["", "-", "null", "none", "na", "n/a"].iter().any(|word| text.eq_ignore_ascii_case(word))
+            })
+    }
+
+    /// A stamp in milliseconds.
+    ///
+    /// # Errors
+    /// [`DataError`] with the line if the field is no time.
+    pub fn millis(&self, column: usize) -> DataResult<Stamp> {
+        let text = self.required(column)?;
+        Stamp::parse_millis(text).map_err(|e| self.no_time(column, text, e))
+    }
+
     /// A stamp in microseconds.
     ///
     /// # Errors
@@ -301,91 +413,4 @@ fn looks_like(text: &str) -> &'static str {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn all(text: &str) -> Vec<(u64, Vec<String>)> {
-        let mut rows = Rows::new(text.as_bytes());
-        let mut found = Vec::new();
-        while let Some(row) = rows.next_row().unwrap() {
-            found.push((row.line(), (0..row.len()).map(|i| row.field(i).unwrap().to_string()).collect()));
-        }
-        found
-    }
-
-    #[test]
-    fn every_usual_separator_is_understood() {
-        let expected =
-            |line, fields: &[&str]| (line, fields.iter().map(ToString::to_string).collect::<Vec<_>>());
-        assert_eq!(
-            all("\u{feff}# head\r\n\r\n1 2\t 3\r\n  # more\n4, 5 ,6,\n7;8\n9"),
-            [
-                expected(3, &["1", "2", "3"]),
-                expected(5, &["4", "5", "6"]),
-                expected(6, &["7", "8"]),
-                expected(7, &["9"]),
-            ]
-        );
-        assert_eq!(all("1,,2"), [expected(1, &["1", "", "2"])]);
-        assert!(all("").is_empty() && all("#\n\n \n").is_empty());
-    }
-
-    #[test]
-    fn numbers_are_taken_strictly() {
-        let mut rows = Rows::new("1.5 nan inf x 1e400 1_000 -2e-3\n1,,3".as_bytes());
-        let row = rows.next_row().unwrap().unwrap();
-        assert_eq!((row.number(0).unwrap(), row.number(6).unwrap()), (1.5, -0.002));
-        let says = |column, text: &str| {
-            let error = row.number(column).unwrap_err().to_string();
-            assert!(error.starts_with("line 1: ") && error.contains(text), "{error}");
-        };
-        says(1, "column 2: nan is not finite");
-        says(2, "inf is not finite");
-        says(3, "`x` is no number");
-        says(4, "1e400 is not finite");
-        says(5, "`1_000` is no number");
-        says(7, "expected 8 columns, found 7");
-        assert!(row.numbers::<2>(0).is_err());
-        let row = rows.next_row().unwrap().unwrap();
-        assert!(row.number(1).unwrap_err().to_string().contains("column 2 is empty"));
-        let cut = row.expect_columns(4).unwrap_err().to_string();
-        assert_eq!(cut, "line 2: expected 4 columns, found 3: the last row is cut off");
-    }
-
-    #[test]
-    fn stamps_are_exact_and_units_are_suspected() {
-        let mut rows =
-            Rows::new("1403715278.76214 1403715273262142976 1403715273262142 1403715273262 x".as_bytes());
-        let row = rows.next_row().unwrap().unwrap();
-        assert_eq!(row.seconds(0).unwrap().as_nanos(), 1_403_715_278_762_140_000);
-        assert_eq!(row.nanos(1).unwrap().as_nanos(), 1_403_715_273_262_142_976);
-        assert_eq!(row.micros(2).unwrap().as_nanos(), 1_403_715_273_262_142_000);
-        let hint = |column| row.seconds(column).unwrap_err().to_string();
-        assert!(hint(1).contains("nanoseconds") && hint(2).contains("microseconds"));
-        let seconds = row.nanos(0).unwrap_err().to_string();
-        assert!(seconds.contains("no whole number of nanoseconds"), "{seconds}");
-        assert!(hint(3).contains("milliseconds") && hint(4).contains("`x` is no time stamp"));
-    }
-
-    #[test]
-    fn a_line_without_end_takes_no_memory() {
-        let mut rows = Rows::new(BufReader::new(std::io::repeat(b'1')));
-        assert!(rows.next_row().unwrap_err().to_string().contains("64 KiB"));
-        let mut rows = Rows::new(&b"1 2\n\xff\xfe\n"[..]);
-        assert!(rows.next_row().is_ok());
-        assert!(rows.next_row().unwrap_err().to_string().contains("line 2: the line is not UTF-8"));
-    }
-
-    proptest! {
-        #[test]
-        fn any_bytes_are_rows_or_an_error(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
-            let mut rows = Rows::new(&bytes[..]);
-            while let Ok(Some(row)) = rows.next_row() {
-                for i in 0..row.len() {
-                    let (_, _) = (row.number(i), row.seconds(i));
-                }
-            }
-        }
-    }
-}
+mod tests;

@@ -24,7 +24,7 @@ pub fn read<T: DeserializeOwned>(path: impl AsRef<Path>) -> DataResult<T> {
 /// # Errors
 /// [`DataError`] with the line if the text is not what `T` wants.
 pub fn parse<T: DeserializeOwned>(text: &str) -> DataResult<T> {
-    let text = text.trim_start_matches('\u{feff}');
+    let text = &*crate::leniency::without_marks(text);
     // Made comments or blanks, not cut out, so that lines keep their numbers. `%YAML:1.0` is no directive of YAML.
     let text = if text.starts_with("%YAML") { format!("#{text}") } else { text.to_string() };
     let text = text.replace("!!opencv-matrix", "                ");
@@ -52,7 +52,7 @@ pub(crate) fn read_text(path: &Path) -> DataResult<String> {
     if text.trim().is_empty() {
         return Err(DataError::new("the file is empty").at(path));
     }
-    Ok(text)
+    Ok(crate::leniency::without_marks(&text).into_owned())
 }
 
 fn first_line(text: &str) -> &str {

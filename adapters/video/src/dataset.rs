@@ -1,7 +1,7 @@
 //! A film as a data set.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use vice_core::camera::Camera;
 use vice_core::dataset::{
@@ -11,11 +11,12 @@ use vice_core::dataset::{
 use vice_core::error::{DataError, DataResult};
 use vice_core::frames::BodyFromCamera;
 use vice_core::imu::{ImuSample, InertialState};
+use vice_core::suspicion::{Suspicion, Suspicions};
 use vice_core::time::Stamp;
 use vice_core::time_unit::unit_mixup;
 use vice_core::trajectory::Trajectory;
 use vice_files::trajectory::ReadOptions;
-use vice_files::{paths, rows};
+use vice_files::{imu_file, paths};
 
 use crate::description::Description;
 use crate::ffmpeg::Ffmpeg;
@@ -62,6 +63,8 @@ struct VideoDataset {
     body_from_camera: BodyFromCamera,
     floor: Floor,
     film: StampedFilm,
+    /// What looked wrong in what was read so far.
+    suspicions: Mutex<Suspicions>,
 }
 
 impl VideoDataset {
@@ -81,7 +84,24 @@ impl VideoDataset {
         let folder = file.canonicalize().ok().and_then(|f| Some(f.parent()?.file_name()?.to_owned()));
         let folder = folder.map(|name| name.to_string_lossy().into_owned());
         let name = description.name.clone().or(folder).unwrap_or_else(|| "film".to_string());
-        Ok(Self { name, file, description, camera, body_from_camera, floor, film })
+        Ok(Self {
+            name,
+            file,
+            description,
+            camera,
+            body_from_camera,
+            floor,
+            film,
+            suspicions: Mutex::default(),
+        })
+    }
+
+    fn suspect(&self, found: Suspicions) {
+        let mut list = self.suspicions.lock().unwrap_or_else(PoisonError::into_inner);
+        // A file that is read twice is not twice as wrong.
+        let fresh: Vec<Suspicion> =
+            found.into_iter().filter(|s| !list.iter().any(|known| known == s)).collect();
+        list.extend(fresh);
     }
 
     fn check_camera(&self, camera: &str) -> DataResult<()> {
@@ -153,7 +173,9 @@ impl Dataset for VideoDataset {
                 .hint(format!("it has: {known}")));
         };
         let path = beside(&self.file, relative)?;
-        let trajectory = vice_files::trajectory::read(&path, &ReadOptions::default())?.trajectory;
+        let file = vice_files::trajectory::read(&path, &ReadOptions::default())?;
+        self.suspect(file.suspicions);
+        let trajectory = file.trajectory;
         let frames = self.film.frames()?;
         let frames = (frames[0], frames[frames.len() - 1]);
         if let Some(error) = unit_mixup(frames, (trajectory.start(), trajectory.end())) {
@@ -164,7 +186,11 @@ impl Dataset for VideoDataset {
 
     fn imu(&self) -> DataResult<Arc<[ImuSample]>> {
         match &self.description.imu {
-            Some(relative) => read_imu(&beside(&self.file, relative)?),
+            Some(relative) => {
+                let file = imu_file::read(beside(&self.file, relative)?)?;
+                self.suspect(file.suspicions);
+                Ok(file.samples.into())
+            }
             None => Ok(Arc::new([])),
         }
     }
@@ -176,32 +202,14 @@ impl Dataset for VideoDataset {
         reference_state(&self.trajectory(GROUND_TRUTH)?, stamp, None)
     }
 
+    fn suspicions(&self) -> Vec<Suspicion> {
+        let list = self.suspicions.lock().unwrap_or_else(PoisonError::into_inner);
+        list.clone().into_iter().collect()
+    }
+
     fn floor(&self, _keyframe: Stamp) -> DataResult<Floor> {
         Ok(self.floor)
     }
-}
-
-/// Reads samples: ns, gyro x y z, accel x y z.
-fn read_imu(path: &Path) -> DataResult<Arc<[ImuSample]>> {
-    let mut samples: Vec<ImuSample> = Vec::new();
-    let mut rows = rows::open(path)?;
-    let mut read = || {
-        while let Some(row) = rows.next_row()? {
-            row.expect_columns(7)?;
-            let sample = ImuSample {
-                stamp: row.nanos(0)?,
-                gyro_rad_s: row.numbers::<3>(1)?.into(),
-                accel_m_s2: row.numbers::<3>(4)?.into(),
-            };
-            if samples.last().is_some_and(|previous| previous.stamp >= sample.stamp) {
-                return Err(row.error(format!("stamp {} ns is not later than the one before", sample.stamp)));
-            }
-            samples.push(sample);
-        }
-        Ok(())
-    };
-    read().map_err(|e: DataError| e.at(path))?;
-    Ok(samples.into())
 }
 
 #[cfg(test)]

@@ -87,7 +87,7 @@ impl Description {
     pub fn read(path: &Path) -> DataResult<Self> {
         let bytes = vice_files::image_file::read_bytes(path)?;
         let text = String::from_utf8(bytes).map_err(|_| DataError::new("is not UTF-8 text").at(path))?;
-        Self::parse(&text).map_err(|e| e.at(path))
+        Self::parse(&vice_files::leniency::without_marks(&text)).map_err(|e| e.at(path))
     }
 
     /// The floor.

@@ -6,6 +6,8 @@ use std::sync::{Arc, OnceLock};
 use vice_core::dataset::{Image, PixelFormat};
 use vice_core::error::{DataError, DataResult};
 use vice_core::time::Stamp;
+use vice_files::columns::TimeUnit;
+use vice_files::heading::TimeColumn;
 use vice_files::rows;
 
 use crate::ffmpeg::Ffmpeg;
@@ -21,11 +23,19 @@ pub fn read_stamps(path: impl AsRef<Path>) -> DataResult<Arc<[Stamp]>> {
     let mut rows =
         rows::open(path).map_err(|e| e.hint("the stamps of the camera's frames are read from it"))?;
     let mut read = || {
+        let beginning = rows.begin()?;
+        let mut time = match &beginning.heading {
+            Some(heading) => heading.time()?.filter(|_| heading.names().len() == 1).ok_or_else(|| {
+                let first = heading.names().first().map_or("", |n| n.text.as_str());
+                DataError::new(format!("column 1: `{first}` is no time stamp")).line(heading.line())
+            })?,
+            None => TimeColumn::new(0, Some(TimeUnit::Nanos)),
+        };
         while let Some(row) = rows.next_row()? {
             if row.len() > 1 {
                 return Err(row.error(format!("expected one stamp a line, found {} columns", row.len())));
             }
-            let stamp = row.nanos(0)?;
+            let stamp = time.stamp(&row)?;
             if let Some(previous) = stamps.last().filter(|p| **p >= stamp) {
                 return Err(
                     row.error(format!("stamp {stamp} ns is not later than the one before, {previous} ns"))
@@ -137,8 +147,16 @@ mod tests {
         };
         let stamps = read("# ns\n1526182346402317409\r\n1526182346502317409\n").unwrap();
         assert_eq!(stamps[0], Stamp::from_nanos(1_526_182_346_402_317_409));
+        for named in [
+            "timestamp [ns]\n1526182346402317409\n",
+            "t\n1526182346402317409\n",
+            "\u{feff}stamp_us\r\n1526182346402317.409\n",
+        ] {
+            assert_eq!(read(named).unwrap()[..], stamps[..1], "{named}");
+        }
         for (text, says) in [
             ("", "no stamps"),
+            ("name\n1\n", "stamps.txt:1: column 1: `name` is no time stamp"),
             ("1\n2\n2\n", "stamps.txt:3: stamp 2 ns is not later"),
             ("1\nx\n", "stamps.txt:2: column 1: `x` is no time stamp"),
             ("1,a.png\n", "stamps.txt:1: expected one stamp a line, found 2 columns"),

@@ -19,7 +19,8 @@ use crate::terminal::{self, Outcome};
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example: vice trajectory ground_truth.csv estimate.txt --align se3 --delta 1 --delta-unit meters --all-pairs\n\n\
-    Files are TUM, EuRoC CSV or KITTI by their content, or relative motions as rel:FILE."
+    Files are tables with a heading that names the columns, else TUM, EuRoC CSV or KITTI by their content, or relative\n\
+    motions as rel:FILE."
 )]
 pub(crate) struct Args {
     /// Reference trajectory.

@@ -128,14 +128,16 @@ pub enum CameraError {
     )]
     UnknownModel(String),
     /// The model has another number of coefficients.
-    #[error("model {model} takes {expected} distortion coefficients, got {got}")]
+    #[error("model {model} takes {expected} distortion coefficients, got {got}{}", if *beyond { ", of which those beyond are not zero" } else { "" })]
     CoefficientCount {
-        /// Name of the model.
-        model: &'static str,
+        /// Name of the model, as it was given.
+        model: String,
         /// How many it takes.
         expected: &'static str,
         /// How many there were.
         got: usize,
+        /// Whether there were too many, and not all of those beyond are zero.
+        beyond: bool,
     },
 }
 
@@ -179,6 +181,8 @@ pub struct Camera {
 impl Model {
     /// A model by the names that calibrations use, with its coefficients.
     ///
+    /// Drivers fill vectors of a fixed length with zeros: those beyond the model's own count are passed over.
+    ///
     /// # Errors
     /// [`CameraError`] for an unknown name, a wrong number of coefficients or one that is not finite.
     pub fn from_name(name: &str, coefficients: &[f64]) -> Result<Self, CameraError> {
@@ -186,26 +190,31 @@ impl Model {
             return Err(CameraError::NotFinite("distortion coefficient"));
         }
         let got = coefficients.len();
-        let count = |model, expected| CameraError::CoefficientCount { model, expected, got };
+        let count = |expected, most: usize| {
+            let model = if name.trim().is_empty() { "none" } else { name.trim() }.to_string();
+            CameraError::CoefficientCount { model, expected, got, beyond: got > most && most > 0 }
+        };
         match name.trim().to_ascii_lowercase().as_str() {
             "pinhole" | "none" | "" => match coefficients.iter().all(|c| *c == 0.0) {
                 true => Ok(Self::Pinhole),
-                false => Err(count("pinhole", "no")),
+                false => Err(count("no", 0)),
             },
-            "radtan" | "radial-tangential" | "plumb_bob" | "brown_conrady" => match *coefficients {
-                [k1, k2, p1, p2] => Ok(Self::Radtan(Radtan { k1, k2, p1, p2, k3: 0.0 })),
-                [k1, k2, p1, p2, k3] => Ok(Self::Radtan(Radtan { k1, k2, p1, p2, k3 })),
-                _ => Err(count("radtan", "4 or 5")),
-            },
-            "rational" | "rational_polynomial" => match *coefficients {
+            "radtan" | "radial-tangential" | "plumb_bob" | "brown_conrady" => {
+                match *without_padding(coefficients, 5) {
+                    [k1, k2, p1, p2] => Ok(Self::Radtan(Radtan { k1, k2, p1, p2, k3: 0.0 })),
+                    [k1, k2, p1, p2, k3] => Ok(Self::Radtan(Radtan { k1, k2, p1, p2, k3 })),
+                    _ => Err(count("4 or 5", 5)),
+                }
+            }
+            "rational" | "rational_polynomial" => match *without_padding(coefficients, 8) {
                 [k1, k2, p1, p2, k3, k4, k5, k6] => {
                     Ok(Self::Rational(Rational { k1, k2, p1, p2, k3, k4, k5, k6 }))
                 }
-                _ => Err(count("rational", "8")),
+                _ => Err(count("8", 8)),
             },
-            "equidistant" | "fisheye" | "kannala_brandt" => match *coefficients {
+            "equidistant" | "fisheye" | "kannala_brandt" => match *without_padding(coefficients, 4) {
                 [k1, k2, k3, k4] => Ok(Self::Equidistant(Equidistant { k1, k2, k3, k4 })),
-                _ => Err(count("equidistant", "4")),
+                _ => Err(count("4", 4)),
             },
             _ => Err(CameraError::UnknownModel(name.to_string())),
         }
@@ -231,6 +240,14 @@ impl Model {
             }
             Self::Equidistant(Equidistant { k1, k2, k3, k4 }) => vec![k1, k2, k3, k4],
         }
+    }
+}
+
+/// The coefficients without zeros beyond the `most` that a model takes.
+fn without_padding(coefficients: &[f64], most: usize) -> &[f64] {
+    match coefficients.split_at_checked(most) {
+        Some((own, padding)) if padding.iter().all(|c| *c == 0.0) => own,
+        _ => coefficients,
     }
 }
 

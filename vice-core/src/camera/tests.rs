@@ -106,3 +106,32 @@ fn bad_calibrations_are_named() {
     assert!(matches!(Model::from_name("radtan", &[1.0]), Err(CameraError::CoefficientCount { .. })));
     assert!(matches!(Model::from_name("radtan", &[f64::NAN; 4]), Err(CameraError::NotFinite(_))));
 }
+
+#[test]
+fn vectors_that_drivers_fill_with_zeros_are_those_of_the_model() {
+    let own = [-0.28, 0.07, 2e-4, 2e-5, 0.01];
+    let radtan = Model::from_name("radtan", &own).unwrap();
+    for padding in [1, 3, 7, 9] {
+        let padded: Vec<f64> = own.iter().copied().chain(std::iter::repeat_n(0.0, padding)).collect();
+        assert_eq!(Model::from_name("plumb_bob", &padded).unwrap(), radtan, "{padding}");
+    }
+    let eight = [0.1, 0.2, 1e-3, 2e-3, 0.3, 0.4, 0.5, 0.6];
+    let rational = Model::from_name("rational", &eight).unwrap();
+    for length in [12, 14] {
+        let mut padded = eight.to_vec();
+        padded.resize(length, 0.0);
+        assert_eq!(Model::from_name("rational_polynomial", &padded).unwrap(), rational);
+        padded[length - 1] = 0.05;
+        let error = Model::from_name("rational_polynomial", &padded).unwrap_err().to_string();
+        assert!(error.contains("rational_polynomial") && error.contains("not zero"), "{error}");
+    }
+    let four = [0.1, 0.2, 0.3, 0.4];
+    let mut padded = four.to_vec();
+    padded.push(0.0);
+    assert_eq!(Model::from_name("equidistant", &padded), Model::from_name("fisheye", &four));
+    let error = Model::from_name("plumb_bob", &[0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.05]).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "model plumb_bob takes 4 or 5 distortion coefficients, got 8, of which those beyond are not zero"
+    );
+}

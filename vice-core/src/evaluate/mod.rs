@@ -12,6 +12,7 @@
 mod curves;
 mod score;
 mod select;
+mod sparse;
 mod streams;
 pub(crate) mod trial;
 
@@ -31,6 +32,7 @@ use crate::metrics::align::Alignment;
 use crate::metrics::pixel::{pooled_rmse_px, subset_rmse_px};
 use crate::result::{DatasetPart, Evaluated, PixelPart, PointName, Sample, Skip};
 use crate::skip::SkipReason;
+use crate::suspicion::Suspicions;
 use crate::time::{Span, Stamp};
 
 /// Why nothing could be evaluated.
@@ -242,13 +244,18 @@ fn run(
         pixel,
         trajectory,
         paths,
-        suspicions: evaluation
-            .dataset
-            .suspicions()
-            .into_iter()
-            .chain(evaluation.depths.iter().flat_map(|source| source.suspicions()))
-            .collect(),
+        suspicions: suspicions(evaluation),
     })
+}
+
+/// What looked wrong in the data, the depth sources and the pose streams, each said once.
+fn suspicions(evaluation: &Evaluation<'_>) -> Suspicions {
+    let mut list: Suspicions = evaluation.dataset.suspicions().into_iter().collect();
+    list.extend(evaluation.depths.iter().flat_map(|source| source.suspicions()));
+    list.extend(evaluation.streams.iter().filter_map(|stream| {
+        sparse::suspicion(stream, evaluation.selection, evaluation.frames, evaluation.max_gap)
+    }));
+    list
 }
 
 fn subset_sizes(asked: Option<&[usize]>, points: usize) -> Result<Vec<usize>, EvaluateError> {

@@ -198,6 +198,25 @@ fn gaps_are_counted_with_their_reason_and_a_gap_at_a_key_frame_skips_its_segment
 }
 
 #[test]
+fn poses_of_key_frames_only_are_said_to_be_sparse() {
+    let labels = labels(&flyer());
+    let said = |every: usize| {
+        let kept = (0..FRAMES).step_by(every).map(|i| (stamp(i), world_from_body(i)));
+        let estimate = stream(Role::Estimate, Trajectory::from_poses(kept).unwrap());
+        run(&labels, &[stream(Role::Reference, exact()), estimate], Window::default()).unwrap().suspicions
+    };
+    let sparse: Vec<_> = said(13).into_iter().collect();
+    assert_eq!(
+        (sparse.len(), sparse[0].code.as_str(), sparse[0].about.as_str()),
+        (1, "sparse-poses", "estimate")
+    );
+    let line = sparse[0].line();
+    assert!(line.contains("a pose every 0.65 s, --max-gap is 0.1 s; 36 of 40 frames lie in a gap"), "{line}");
+    assert!(line.contains("the nearest pose 0.2 s away") && line.contains("--max-gap 0.7"), "{line}");
+    assert!(said(1).is_empty() && said(2).is_empty());
+}
+
+#[test]
 fn points_carried_behind_the_camera_are_a_finding_about_an_estimate() {
     let about_x = UnitQuaternion::from_euler_angles(std::f64::consts::PI, 0.0, 0.0);
     let half_turn: Rigid<Body, Body> = Rigid::from_parts(Vector3::zeros(), about_x);

@@ -6,7 +6,7 @@
 use crate::error::{DataError, DataResult};
 use crate::frames::WorldFromBody;
 use crate::time::{Span, Stamp};
-use crate::time_unit::suspect_unit;
+use crate::time_unit::{own_start, suspect_unit};
 use crate::trajectory::Trajectory;
 
 /// How poses of the reference are found for poses of the estimate.
@@ -243,13 +243,35 @@ fn nothing_matches(reference: &Trajectory, estimate: &Trajectory, t_offset: Span
         e0.to_seconds_text(),
         e1.to_seconds_text()
     ));
-    match suspect_unit((r0, r1), (e0, e1)) {
-        Some(mixed_up) => error.hint(format!("the estimate's times look like {mixed_up}")),
-        None if e1 < r0 || r1 < e0 => {
-            error.hint("the two do not overlap in time; are their clocks the same?")
-        }
-        None => error.hint("the two overlap, but their stamps are further apart than that"),
+    if let Some(mixed_up) = suspect_unit((r0, r1), (e0, e1)) {
+        return error.hint(format!("the estimate's times look like {mixed_up}"));
     }
+    if let Some(offset) = own_start((r0, r1), (e0, e1)) {
+        let (own, epoch) = if e0 < r0 { ("estimate", "reference") } else { ("reference", "estimate") };
+        return error.hint(format!(
+            "the {own}'s stamps count from its own start, the {epoch}'s from 1970: an offset of {} s, as --t-offset takes \
+             it, would put both starts together",
+            (t_offset + offset).to_seconds_text()
+        ));
+    }
+    if e1 < r0 || r1 < e0 {
+        return error.hint("the two do not overlap in time; are their clocks the same?");
+    }
+    let spacing = |t: &Trajectory| match t.median_spacing() {
+        Some(spacing) => format!("every {} s", spacing.to_short_text()),
+        None => "once".to_string(),
+    };
+    let away = estimate.stamps().iter().map(|stamp| {
+        let stamp = *stamp + t_offset;
+        reference.stamps()[reference.nearest(stamp)].since(stamp).abs()
+    });
+    error.hint(format!(
+        "the two overlap, but their stamps are further apart than that: the reference has a pose {}, the estimate {}, \
+         and the nearest two are {} s apart",
+        spacing(reference),
+        spacing(estimate),
+        away.min().map_or_else(String::new, Span::to_short_text)
+    ))
 }
 
 #[cfg(test)]
@@ -315,6 +337,20 @@ mod tests {
         assert!(error(&[t0 / 1000]).contains("look like microseconds read as nanoseconds"));
         assert!(error(&[t0 + 60_000_000_000]).contains("do not overlap in time"));
         assert!(error(&[t0 + 1_000_000_000]).contains("the two overlap"));
+        let sparse = error(&[t0 + 1_000_000_000]);
+        assert!(
+            sparse.contains(
+                "the reference has a pose every 2 s, the estimate once, and the nearest two are 1 s"
+            ),
+            "{sparse}"
+        );
+        let own_start = error(&[0, 2_950_000_000]);
+        assert!(
+            own_start.contains("counts from its own start") || own_start.contains("count from its own start")
+        );
+        assert!(
+            own_start.contains("an offset of 1403715278.000000000 s") && !own_start.contains("seconds read")
+        );
         // Times since the start: the range shows it, the epoch does not.
         let (r, e) = (at([100_000_000_000, 200_000_000_000]), at([100, 200]));
         let error = associate(&r, &e, Span::from_millis(10), Span::ZERO).unwrap_err().to_string();

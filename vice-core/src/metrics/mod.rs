@@ -4,6 +4,7 @@ pub mod align;
 pub mod associate;
 pub mod pixel;
 pub mod plane;
+pub mod quaternion_order;
 pub mod rotation_offset;
 pub mod rpe;
 pub mod trajectory;

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 use vice_core::error::{DataError, DataResult};
+use vice_core::suspicion::{Suspicion, Suspicions};
 
 use super::memory::shown;
 use super::{BYTES_PER_POINT, CloudOptions, ScanPoints, memory};
@@ -9,6 +10,9 @@ use crate::ply::PointSink;
 
 /// Smallest cube that thinning may use, metres.
 const MIN_VOXEL_M: f64 = 1e-6;
+
+/// Steps of coordinates, metres, from which on a scan is coarser than its use.
+const COARSE_M: f32 = 0.01;
 
 /// Points that a buffer holds at least, so that small scans do not grow it again and again.
 const MIN_CAPACITY: usize = 1 << 16;
@@ -27,6 +31,8 @@ pub(super) struct Collector {
     promised: u64,
     max_bytes: u64,
     voxel_m: Option<f64>,
+    /// Whether the file stores the coordinates in single precision.
+    single_precision: bool,
 }
 
 impl Collector {
@@ -46,12 +52,13 @@ impl Collector {
             promised: 0,
             max_bytes: options.max_bytes.unwrap_or_else(memory::available_bytes),
             voxel_m: options.voxel_m,
+            single_precision: true,
         })
     }
 
     /// What has been gathered, thinned to the end.
     pub(super) fn finish(mut self, name: &str) -> DataResult<ScanPoints> {
-        let Self { offered, left_out, origin_m, .. } = self;
+        let Self { offered, left_out, origin_m, single_precision, .. } = self;
         if let Some(edge) = self.voxel_m {
             thin(&mut self.points, edge);
         }
@@ -63,12 +70,18 @@ impl Collector {
             };
             return Err(DataError::new(problem));
         }
+        let mut suspicions = Suspicions::new();
         if let Some(first) = self.first_left_out {
-            tracing::warn!(
-                "{name}: {left_out} of {offered} points are not finite and were left out (the first is point {first})"
+            suspicions.add(
+                Suspicion::new("points-left-out", name, "points are not finite and were left out")
+                    .evidence(format!("{left_out} of {offered} points, the first is point {first}"))
+                    .times(left_out),
             );
         }
-        Ok(ScanPoints { origin_m, points: self.points })
+        if single_precision {
+            suspicions.extend(rounded(&self.points, name));
+        }
+        Ok(ScanPoints { origin_m, points: self.points, suspicions })
     }
 
     fn leave_out(&mut self) {
@@ -166,9 +179,37 @@ impl PointSink for Collector {
         if self.points.is_empty() && point.iter().all(|v| v.is_finite()) {
             self.origin_m = point.map(f64::round);
         }
+        self.single_precision = false;
         let origin = self.origin_m;
         self.single(std::array::from_fn(|i| (point[i] - origin[i]) as f32))
     }
+}
+
+/// Coordinates so large that single precision keeps them to centimetres only, as those of a map are.
+fn rounded(points: &[[f32; 3]], name: &str) -> Option<Suspicion> {
+    let largest = |axis: usize| points.iter().map(|p| p[axis].abs()).fold(0.0, f32::max);
+    let steps: Vec<(usize, f32, f32)> =
+        (0..3).map(|axis| (axis, largest(axis), largest(axis).next_up() - largest(axis))).collect();
+    let coarse = |step: f32| step >= COARSE_M;
+    if !steps.iter().any(|(_, _, step)| coarse(*step)) {
+        return None;
+    }
+    let axes: Vec<String> = steps
+        .iter()
+        .filter(|(_, _, step)| coarse(*step))
+        .map(|(axis, largest, step)| {
+            format!("{} reaches {largest:.0} m and is known to {step} m", ["x", "y", "z"][*axis])
+        })
+        .collect();
+    Some(
+        Suspicion::new(
+            "cloud-precision",
+            name,
+            "coordinates this large are rounded in single precision (float)",
+        )
+        .evidence(axes.join(", "))
+        .advice("store the cloud in double precision, or subtract an offset from cloud and poses"),
+    )
 }
 
 /// Keeps one point of each cube of space: the one nearest to its centre, whatever order they came in.
@@ -257,5 +298,30 @@ mod tests {
         collector.double([1e6 + 0.125, 2e6, 30.0]).unwrap();
         assert_eq!((collector.left_out, collector.first_left_out), (2, Some(1)));
         assert_eq!((collector.origin_m, &collector.points[1]), ([1e6, 2e6, 30.0], &[0.125, 0.0, 0.0]));
+    }
+
+    #[test]
+    fn coordinates_of_a_map_in_single_precision_are_suspected() {
+        let said = |points: &[[f32; 3]]| {
+            let mut collector = Collector::new(&options(None, 1_000_000)).unwrap();
+            points.iter().for_each(|p| collector.single(*p).unwrap());
+            collector.finish("a.ply").unwrap().suspicions.iter().map(Suspicion::line).collect::<Vec<_>>()
+        };
+        let utm = said(&[[461_234.0, 5_428_765.0, 312.0]]);
+        assert!(
+            utm[0].contains(
+                "x reaches 461234 m and is known to 0.03125 m, y reaches 5428765 m and is known to 0.5 m"
+            ),
+            "{utm:?}"
+        );
+        assert!(utm[0].contains("double precision") && !utm[0].contains("z reaches"));
+        assert_eq!(said(&[[-461_234.0, 0.0, 0.0]]).len(), 1, "on either side of zero");
+        assert!(said(&[[1000.0, -2000.0, 30.0]]).is_empty(), "a hall, or millimetres of a table");
+        let mut double = Collector::new(&options(None, 1_000_000)).unwrap();
+        double.double([461_234.0, 5_428_765.0, 312.0]).unwrap();
+        double.double([461_235.5, 5_428_764.25, f64::NAN]).unwrap();
+        let codes: Vec<String> =
+            double.finish("a.ply").unwrap().suspicions.into_iter().map(|s| s.code).collect();
+        assert_eq!(codes, ["points-left-out"]);
     }
 }

@@ -17,6 +17,7 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 use vice_core::dataset::{CloudRef, CloudSource};
 use vice_core::error::{DataError, DataResult};
+use vice_core::suspicion::{Suspicion, Suspicions};
 
 use crate::ply::{self, PointSink};
 use collect::Collector;
@@ -45,11 +46,13 @@ pub struct ScanPoints {
     pub origin_m: [f64; 3],
     /// Metres, all finite.
     pub points: Vec<[f32; 3]>,
+    /// What was left out, and what looks wrong.
+    pub suspicions: Suspicions,
 }
 
 /// Reads the points of a PLY file: text or binary, any order and type of properties. Faces are not looked at.
 ///
-/// Points that are not finite are left out, which a warning says.
+/// Points that are not finite are left out, which a suspicion says.
 ///
 /// # Errors
 /// [`DataError`] with the byte or line if the file cannot be used, ends too early, has no finite point, or does not
@@ -63,12 +66,14 @@ pub fn read_ply_points(path: impl AsRef<Path>, options: &CloudOptions) -> DataRe
 
 /// The points of a scan, metres, in the frame of the scan.
 ///
-/// A cloud that is kilometres wide is suspected to be in millimetres, which a warning says.
+/// What looks wrong is in [`Cloud::suspicions`], and logged: a cloud that is kilometres wide may be in millimetres, and
+/// coordinates of a map do not fit single precision.
 #[derive(Clone, Debug)]
 pub struct Cloud {
     points: Vec<[f32; 3]>,
     origin_m: Vector3<f64>,
     tree: Tree,
+    suspicions: Suspicions,
 }
 
 impl Cloud {
@@ -100,13 +105,24 @@ impl Cloud {
     }
 
     fn indexed(points: ScanPoints, name: &str) -> Self {
-        let ScanPoints { origin_m, mut points } = points;
+        let ScanPoints { origin_m, mut points, mut suspicions } = points;
         let tree = Tree::build(&mut points);
         let extent = tree.bounds().size().into_iter().fold(0.0, f32::max);
         if extent > SUSPICIOUS_EXTENT_M {
-            tracing::warn!("{name}: the points are spread over {extent:.0} m: is the scan in millimetres?");
+            suspicions.add(
+                Suspicion::new("cloud-extent", name, format!("the points are spread over {extent:.0} m"))
+                    .advice("is the scan in millimetres?"),
+            );
         }
-        Self { points, origin_m: origin_m.into(), tree }
+        for suspicion in suspicions.iter() {
+            tracing::warn!("{}", suspicion.line());
+        }
+        Self { points, origin_m: origin_m.into(), tree, suspicions }
+    }
+
+    /// What was left out of the scan, and what looks wrong with it.
+    pub const fn suspicions(&self) -> &Suspicions {
+        &self.suspicions
     }
 
     /// Number of points, at least 1.

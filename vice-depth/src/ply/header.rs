@@ -13,6 +13,9 @@ use vice_core::error::{DataError, DataResult};
 /// A header longer than this is no header (1 MiB; real ones have a few hundred bytes).
 const MAX_HEADER_BYTES: usize = 1 << 20;
 
+/// U+FEFF in UTF-8.
+pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
 /// How rows are encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Layout {
@@ -134,8 +137,8 @@ pub(crate) struct Header {
 impl Header {
     /// Reads up to and including the line `end_header`.
     pub(crate) fn read(reader: &mut impl BufRead) -> DataResult<Self> {
-        let (text, lines) = read_text(reader)?;
-        let bytes = text.len() as u64;
+        let (text, lines, passed) = read_text(reader)?;
+        let bytes = text.len() as u64 + passed;
         let text = String::from_utf8_lossy(&text);
         let mut source = Reader::new(text.as_bytes());
         let parsed = Parser::<DefaultElement>::new().read_header(&mut source).map_err(|e| {
@@ -181,21 +184,27 @@ impl Header {
     }
 }
 
-fn read_text(reader: &mut impl BufRead) -> DataResult<(Vec<u8>, u64)> {
-    let (mut text, mut lines) = (Vec::new(), 0);
+/// The text, its lines, and bytes that were passed over.
+fn read_text(reader: &mut impl BufRead) -> DataResult<(Vec<u8>, u64, u64)> {
+    let (mut text, mut lines, mut passed) = (Vec::new(), 0, 0);
     loop {
         let start = text.len();
         let limit = (MAX_HEADER_BYTES - start) as u64;
         let got = std::io::Read::take(&mut *reader, limit)
             .read_until(b'\n', &mut text)
             .map_err(|e| DataError::new("cannot be read").because(e))?;
+        // Programs that treat a header as text write a byte-order mark in front of it.
+        if text[start..].starts_with(BYTE_ORDER_MARK) {
+            text.drain(start..start + BYTE_ORDER_MARK.len());
+            passed += BYTE_ORDER_MARK.len() as u64;
+        }
         let line = text[start..].trim_ascii();
         if start == 0 && line != b"ply" {
             return Err(DataError::new("not a PLY file: it does not begin with `ply`"));
         }
         lines += 1;
         if line == b"end_header" {
-            return Ok((text, lines));
+            return Ok((text, lines, passed));
         }
         if got == 0 {
             let problem =

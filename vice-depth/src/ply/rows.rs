@@ -10,7 +10,7 @@ use ply_rs::parser::{ParseError, Parser};
 use ply_rs::ply::{Property, PropertyAccess, PropertyAccessResult};
 use vice_core::error::{DataError, DataResult};
 
-use super::header::{Element, Kind, Layout, Scalar};
+use super::header::{BYTE_ORDER_MARK, Element, Kind, Layout, Scalar};
 use super::number::{next_number, skip_word};
 use super::source::{Source, unreadable};
 
@@ -232,6 +232,7 @@ impl<R: Read> Rows<R> {
     /// Length of the next line that is not blank, its end included; blank ones are passed over.
     fn text_row(&mut self, element: &Element, row: u64) -> DataResult<usize> {
         let mut searched = 0;
+        self.pass_mark()?;
         loop {
             let bytes = self.source.ahead();
             if let Some(end) = bytes[searched..].iter().position(|b| *b == b'\n') {
@@ -241,6 +242,7 @@ impl<R: Read> Rows<R> {
                     return Ok(length);
                 }
                 self.source.pass(length);
+                self.pass_mark()?;
                 searched = 0;
                 continue;
             }
@@ -254,6 +256,14 @@ impl<R: Read> Rows<R> {
                 return Ok(searched);
             }
         }
+    }
+
+    /// A byte-order mark where a line starts is no part of its numbers.
+    fn pass_mark(&mut self) -> DataResult<()> {
+        if self.source.at_least(BYTE_ORDER_MARK.len())? && self.source.ahead().starts_with(BYTE_ORDER_MARK) {
+            self.source.pass(BYTE_ORDER_MARK.len());
+        }
+        Ok(())
     }
 
     fn broken_promise(&self, element: &Element, rows: u64) -> DataError {

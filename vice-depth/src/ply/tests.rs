@@ -226,3 +226,31 @@ proptest! {
         let _ = read(&whole);
     }
 }
+
+#[test]
+fn byte_order_marks_are_passed_over_where_a_line_starts() {
+    let header = format!("format ascii 1.0\nelement vertex 2\n{XYZ}");
+    let rows: [[f32; 3]; 2] = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]];
+    let mark = "\u{feff}";
+    for text in [
+        format!("{mark}ply\n{header}\nend_header\n1 2 3\n4 5 6\n"),
+        format!("ply\n{header}\nend_header\n{mark}1 2 3\n4 5 6\n"),
+        format!("{mark}ply\n{mark}{header}\n{mark}end_header\n{mark}1 2 3\n\n{mark}4 5 6"),
+    ] {
+        assert_eq!(read(text.as_bytes()).unwrap().single, rows, "{text:?}");
+    }
+    // Rows that are skipped, rows with lists, and rows of binary numbers behind a marked header.
+    let skipped = format!(
+        "ply\nformat ascii 1.0\nelement junk 1\nproperty int a\nelement vertex 2\n{XYZ}\nend_header\n{mark}7\n{mark}1 2 3\n4 5 6\n"
+    );
+    assert_eq!(read(skipped.as_bytes()).unwrap().single, rows);
+    let lists = format!(
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty list uchar int n\n{XYZ}\nend_header\n{mark}0 1 2 3\n{mark}1 9 4 5 6\n"
+    );
+    assert_eq!(read(lists.as_bytes()).unwrap().single, rows);
+    let mut binary =
+        format!("{mark}ply\nformat binary_little_endian 1.0\nelement vertex 2\n{XYZ}\nend_header\n")
+            .into_bytes();
+    binary.extend(rows.as_flattened().iter().flat_map(|v| v.to_le_bytes()));
+    assert_eq!(read(&binary).unwrap().single, rows);
+}

@@ -22,6 +22,7 @@ use vice_core::dataset::Floor;
 use vice_core::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
 use vice_core::error::DataResult;
 use vice_core::frames::{self, Rigid, World};
+use vice_core::suspicion::Suspicion;
 
 use crate::cloud::Cloud;
 use interpolate::{Limits, Local, Surface};
@@ -140,6 +141,10 @@ impl DepthSource for ZMapDepth {
 
     fn needs_world(&self, _: &Floor) -> bool {
         true
+    }
+
+    fn suspicions(&self) -> Vec<Suspicion> {
+        self.cloud.suspicions().iter().cloned().collect()
     }
 
     fn roughness(&self) -> f64 {

@@ -11,28 +11,48 @@
 //! distortion = [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]
 //! body_from_camera = [0, -1, 0, 0,  1, 0, 0, 0,  0, 0, 1, 0,  0, 0, 0, 1]   # row by row, metres
 //! ```
-//! or the camchain that Kalibr writes, whose `T_cam_imu` is `camera_from_body`.
+//! or what other tools write, told by its keys: the camchain of Kalibr (`T_cam_imu`, `T_cn_cnm1`) and of OpenVINS
+//! (`T_imu_cam`), EuRoC's `sensor.yaml` (`T_BS`), `camera_info` of ROS, OpenCV's YAML and XML, ORB-SLAM and VINS. A key
+//! about geometry, time or size is used or refused by its name; others that are not known are in
+//! [`CalibrationFile::suspicions`]. `timeshift_cam_imu` is the clock offset of its camera.
 
-mod kalibr;
+mod dialects;
+mod keys;
 mod toml_file;
+mod tree;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use vice_core::camera::{Camera, CameraError, Model};
-use vice_core::error::{DataError, DataResult};
+use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::frames::BodyFromCamera;
+use vice_core::suspicion::{Suspicion, Suspicions};
 use vice_core::time::Span;
 
 use crate::atomic::{self, Overwrite};
 use crate::rigid_file::is_toml;
 use crate::yaml;
 
+/// What is read, for messages.
+const DIALECTS: &str = "a calibration is TOML (named .toml), a camchain of Kalibr or OpenVINS, a sensor.yaml, a camera_info \
+                        of ROS, or OpenCV's YAML or XML";
+
 /// A calibration, by camera.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CalibrationFile {
     path: PathBuf,
     cameras: BTreeMap<String, CameraOverride>,
+    /// The file describes one camera and does not say under which name the data set has it.
+    nameless: bool,
+    /// Topics of the cameras, where the file names them.
+    topics: BTreeMap<String, String>,
+    /// Added to the stamps of an estimate, by camera.
+    time_offsets: BTreeMap<String, Span>,
+    /// Keys that are not known, and about nothing that matters here.
+    unused: Vec<String>,
+    said: Vec<Suspicion>,
+    suspicions: Suspicions,
     /// Added to the stamps of an estimate, where the file says so.
     pub time_offset: Option<Span>,
 }
@@ -58,21 +78,104 @@ impl CalibrationFile {
         Self::default()
     }
 
-    /// Reads a TOML file, by its extension, or else a Kalibr camchain.
+    /// Reads a TOML file, by its extension, or else a file of another tool.
     ///
     /// # Errors
     /// [`DataError`] with path and line if the file cannot be read, says nothing, or holds a negative focal length, an
-    /// unknown model, a wrong number of coefficients, or a matrix that is no rigid transform.
+    /// unknown model, a wrong number of coefficients, a matrix that is no rigid transform, statements that contradict
+    /// each other, or a key about geometry, time or size that is not known.
     pub fn read(path: impl AsRef<Path>) -> DataResult<Self> {
         let path = path.as_ref();
         let text = yaml::read_text(path)?;
-        let parsed = if is_toml(path) { toml_file::parse(&text) } else { kalibr::parse(&text) };
+        let parsed = if is_toml(path) { toml_file::parse(&text) } else { dialects::parse(&text) };
         let mut file = parsed.map_err(|e| e.at(path))?;
         file.path = path.to_path_buf();
+        file.put_into_words();
         for (name, camera) in &file.cameras {
             camera.check().map_err(|e| in_camera(name, &e).at(path))?;
         }
         Ok(file)
+    }
+
+    /// What is not used of the file, and what was done that the user should know.
+    pub const fn suspicions(&self) -> &Suspicions {
+        &self.suspicions
+    }
+
+    fn put_into_words(&mut self) {
+        let about = self.path.display().to_string();
+        if !self.unused.is_empty() {
+            self.unused.sort();
+            self.unused.dedup();
+            self.suspicions.add(
+                Suspicion::new("calibration-keys", &about, "keys that are not known are not used")
+                    .evidence(self.unused.join(", ")),
+            );
+        }
+        for mut suspicion in std::mem::take(&mut self.said) {
+            suspicion.about = format!("{about} [{}]", suspicion.about);
+            self.suspicions.add(suspicion);
+        }
+    }
+
+    /// The file for a camera of a data set: the entry that is about it, under its name.
+    ///
+    /// It is the one of that name, else the one whose topic names the camera, else the only one where the data set has
+    /// but one camera, or where the file does not name its camera.
+    ///
+    /// # Errors
+    /// [`DataError`] if the file is about other cameras, or several of its entries could be meant.
+    pub fn for_camera(&self, camera: &str, cameras: &[String]) -> DataResult<Self> {
+        if self.cameras.is_empty() || self.cameras.contains_key(camera) {
+            return Ok(self.clone());
+        }
+        let entry = match self.entry_of(camera) {
+            Some(entry) => Some(entry),
+            None if self.cameras.len() == 1 && (cameras.len() <= 1 || self.nameless) => {
+                self.cameras.keys().next()
+            }
+            None => None,
+        };
+        let Some(entry) = entry.cloned() else {
+            let known: Vec<&str> = self.cameras.keys().map(String::as_str).collect();
+            return Err(DataError::of_kind(
+                ErrorKind::Contradictory,
+                format!(
+                    "the file is of {}, the camera is {camera}; give its entry that name",
+                    known.join(", ")
+                ),
+            )
+            .at(&self.path));
+        };
+        let mut file = self.clone();
+        if let Some(found) = file.cameras.remove(&entry) {
+            file.cameras.insert(camera.to_string(), found);
+        }
+        if let Some(offset) = file.time_offsets.remove(&entry) {
+            file.time_offsets.insert(camera.to_string(), offset);
+        }
+        Ok(file)
+    }
+
+    /// The one entry whose topic has the camera's name as a part: `/cam0/image_raw` is `cam0`.
+    fn entry_of(&self, camera: &str) -> Option<&String> {
+        let names = |topic: &str| topic == camera || topic.split('/').any(|part| part == camera);
+        let mut found = self.topics.iter().filter(|(_, topic)| names(topic)).map(|(name, _)| name);
+        found.next().filter(|_| found.next().is_none())
+    }
+
+    /// What is added to the stamps of an estimate where this camera's frames are looked at: what the file says for all
+    /// cameras, else for this one (also by its topic, or where it is the only one).
+    pub fn time_offset_of(&self, camera: &str) -> Option<Span> {
+        let entry = match self.cameras.contains_key(camera) {
+            true => camera,
+            false => match self.entry_of(camera) {
+                Some(entry) => entry,
+                None if self.cameras.len() == 1 => self.cameras.keys().next()?,
+                None => return self.time_offset,
+            },
+        };
+        self.time_offset.or_else(|| self.time_offsets.get(entry).copied())
     }
 
     /// Adds a camera, or takes the place of one of that name.

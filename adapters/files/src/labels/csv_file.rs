@@ -1,43 +1,121 @@
-//! Labels as CSV. Columns are found by their names, in any order.
+//! Labels as CSV. Columns are found by their names, in any order, between commas, semicolons or tabs.
 
 use std::io::{self, Write};
 
 use vice_core::camera::Pixel;
 use vice_core::error::{DataError, DataResult};
 use vice_core::label::{LabelSet, LabelSetBuilder, Observation, ObservationSource};
-use vice_core::time::Stamp;
+use vice_core::suspicion::Suspicion;
 
-use super::{label_error, no_labels};
+use super::csv_columns::Columns;
+use super::{LabelFile, label_error, no_labels, rounded};
+use crate::leniency::Leniency;
 
 const OCCLUDED: &str = "occluded";
 const UNCERTAIN: &str = "uncertain";
 
 /// Reads CSV with a heading. `source` is `manual` and `flags` empty where there are no such columns.
 ///
-/// `flags` are `occluded` and `uncertain`, joined by `+` or `|`. Columns with other names are passed over with a warning.
+/// `flags` are `occluded` and `uncertain`, joined by `+` or `|`. Stamps are in the unit that the name of their column
+/// says. A row whose pixel is NaN holds no label and is left out, unless it is a key frame.
 ///
 /// # Errors
-/// [`DataError`] with the line for a missing column, a field that cannot be read, and as [`LabelSet::from_rows`].
+/// [`DataError`] with the line for a missing column, a field that cannot be read, stamps that were rounded, and as
+/// [`LabelSet::from_rows`].
 pub fn read_csv(bytes: &[u8]) -> DataResult<LabelSet> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    read_csv_file(bytes).map(|file| file.labels)
+}
+
+/// The same, with what was left out and columns that are not known.
+///
+/// # Errors
+/// As [`read_csv`].
+pub fn read_csv_file(bytes: &[u8]) -> DataResult<LabelFile> {
+    let bytes = &*without_marks(bytes);
     // The reader's own trimming of fields allocates a record anew for each line.
-    let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::Headers).comment(Some(b'#')).from_reader(bytes);
+    let mut csv = csv::ReaderBuilder::new()
+        .trim(csv::Trim::Headers)
+        .comment(Some(b'#'))
+        .delimiter(delimiter(bytes))
+        .from_reader(bytes);
     let mut lines = Lines { bytes, counted: 0, line: 1 };
     let heading = csv.headers().map_err(|e| csv_error(&e))?.clone();
     let heading_line = lines.at_end_of_record(csv.position());
-    let columns = Columns::find(&heading).map_err(|e| e.line(heading_line))?;
+    let mut columns = Columns::find(heading.iter()).map_err(|e| e.line(heading_line))?;
     let mut labels = LabelSetBuilder::default();
-    let mut any = false;
+    let mut lenient = Leniency::new();
+    // Stamps of few digits, and the largest number of these.
+    let (mut rows, mut few, mut most_digits, mut kept) = (0_u64, 0_u64, 0, 0);
     let mut record = csv::StringRecord::new();
     loop {
         let read = csv.read_record(&mut record);
         let line = lines.at_end_of_record(csv.position());
         if !read.map_err(|e| csv_error(&e).line(line))? {
-            return if any { labels.finish().map_err(|e| label_error(&e)) } else { Err(no_labels()) };
+            break;
         }
-        any = true;
-        let observation = columns.observation(&record, line).map_err(|e| e.line(line))?;
-        labels.push(columns.point(&record), observation).map_err(|e| label_error(&e))?;
+        rows += 1;
+        lenient.row();
+        if let Some(digits) =
+            rounded::digits_of_exponent_form(record.get(columns.timestamp).unwrap_or_default())
+        {
+            few += 1;
+            most_digits = most_digits.max(digits);
+        }
+        let observation = observation(&mut columns, &record, line).map_err(|e| e.line(line))?;
+        if !observation.keyframe && (observation.px.u.is_nan() || observation.px.v.is_nan()) {
+            lenient.gap(line);
+            continue;
+        }
+        kept += 1;
+        let point = record.get(columns.point).unwrap_or_default().trim();
+        labels.push(point, observation).map_err(|e| label_error(&e))?;
+    }
+    if rows == 0 {
+        return Err(no_labels());
+    }
+    // One stamp may end in zeros; all of them do only where something rounded them.
+    if rows > 1 && few == rows {
+        return Err(rounded::error(most_digits).line(heading_line + 1));
+    }
+    lenient.check(kept, "pixel")?;
+    let labels =
+        labels.finish().map_err(|e| if few > 0 { rounded::error(most_digits) } else { label_error(&e) })?;
+    let mut file = LabelFile::of(labels);
+    file.suspicions = lenient.suspicions("");
+    if !columns.unknown.is_empty() {
+        file.suspicions.add(
+            Suspicion::new("label-columns", "", "columns that are not known are passed over")
+                .evidence(columns.unknown.join(", ")),
+        );
+    }
+    Ok(file)
+}
+
+/// Bytes without byte-order marks where a line starts.
+fn without_marks(bytes: &[u8]) -> std::borrow::Cow<'_, [u8]> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    if !bytes.windows(4).any(|w| w == b"\n\xef\xbb\xbf") {
+        return bytes.into();
+    }
+    let mut without = Vec::with_capacity(bytes.len());
+    for (i, line) in bytes.split(|b| *b == b'\n').enumerate() {
+        if i > 0 {
+            without.push(b'\n');
+        }
+        without.extend_from_slice(line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line));
+    }
+    without.into()
+}
+
+/// What stands between the names of the heading, as spreadsheets of some countries have it.
+fn delimiter(bytes: &[u8]) -> u8 {
+    let is_heading = |line: &&[u8]| !line.trim_ascii().is_empty() && !line.starts_with(b"#");
+    let heading = bytes.split(|b| *b == b'\n').find(is_heading).unwrap_or_default();
+    match heading {
+        line if line.contains(&b',') => b',',
+        line if line.contains(&b';') => b';',
+        line if line.contains(&b'\t') => b'\t',
+        _ => b',',
     }
 }
 
@@ -66,7 +144,10 @@ impl Lines<'_> {
 /// # Errors
 /// [`io::Error`] of the writer.
 pub fn write_csv(writer: &mut dyn Write, labels: &LabelSet) -> io::Result<()> {
-    let mut csv = csv::Writer::from_writer(writer);
+    // A name that begins as a byte-order mark does would be taken for one where a line starts.
+    let marked = labels.points().iter().any(|p| p.name.starts_with('\u{feff}'));
+    let quotes = if marked { csv::QuoteStyle::Always } else { csv::QuoteStyle::Necessary };
+    let mut csv = csv::WriterBuilder::new().quote_style(quotes).from_writer(writer);
     csv.write_record(["point", "timestamp_ns", "u_px", "v_px", "keyframe", "source", "flags"])?;
     for point in labels.points() {
         for o in &point.observations {
@@ -86,86 +167,45 @@ pub fn write_csv(writer: &mut dyn Write, labels: &LabelSet) -> io::Result<()> {
     csv.flush()
 }
 
-/// Where the columns are.
-struct Columns {
-    point: usize,
-    timestamp_ns: usize,
-    u_px: usize,
-    v_px: usize,
-    keyframe: usize,
-    source: Option<usize>,
-    flags: Option<usize>,
-}
-
-impl Columns {
-    fn find(heading: &csv::StringRecord) -> DataResult<Self> {
-        let expected = "a heading `point,timestamp_ns,u_px,v_px,keyframe[,source,flags]` is expected";
-        if heading.is_empty() {
-            return Err(DataError::new("the file is empty").hint(expected));
+fn observation(columns: &mut Columns, record: &csv::StringRecord, line: u64) -> DataResult<Observation> {
+    let field = |column: usize| record.get(column).unwrap_or_default().trim();
+    let number = |column: usize, name: &str| {
+        let text = field(column);
+        if text.get(..3).is_some_and(|t| t.eq_ignore_ascii_case("nan")) {
+            return Ok(f64::NAN);
         }
-        let known = ["point", "timestamp_ns", "u_px", "v_px", "keyframe", "source", "flags"];
-        let find = |name: &str| heading.iter().position(|column| column == name);
-        let required = |name: &str| {
-            find(name).ok_or_else(|| DataError::new(format!("the column {name} is missing")).hint(expected))
-        };
-        if let Some(twice) = known.iter().find(|n| heading.iter().filter(|c| c == *n).count() > 1) {
-            return Err(DataError::new(format!("the column {twice} appears twice")));
-        }
-        let columns = Self {
-            point: required("point")?,
-            timestamp_ns: required("timestamp_ns")?,
-            u_px: required("u_px")?,
-            v_px: required("v_px")?,
-            keyframe: required("keyframe")?,
-            source: find("source"),
-            flags: find("flags"),
-        };
-        for name in heading.iter().filter(|name| !known.contains(name)) {
-            tracing::warn!("labels: column `{name}` is not known and passed over");
-        }
-        Ok(columns)
-    }
-
-    fn point<'r>(&self, record: &'r csv::StringRecord) -> &'r str {
-        record.get(self.point).unwrap_or_default().trim()
-    }
-
-    fn observation(&self, record: &csv::StringRecord, line: u64) -> DataResult<Observation> {
-        let field = |column: usize| record.get(column).unwrap_or_default().trim();
-        let number = |column: usize, name: &str| {
-            let text = field(column);
-            text.parse::<f64>().map_err(|_| DataError::new(format!("{name}: `{text}` is no number")))
-        };
-        let stamp = Stamp::parse_nanos(field(self.timestamp_ns)).map_err(|_| {
-            DataError::new(format!("timestamp_ns: `{}` is no time in ns", field(self.timestamp_ns)))
-        })?;
-        let keyframe = match field(self.keyframe) {
-            "1" | "true" | "True" => true,
-            "0" | "false" | "False" => false,
-            other => return Err(DataError::new(format!("keyframe: `{other}` is neither 0 nor 1"))),
-        };
-        let source = match self.source.map(field).unwrap_or_default() {
-            "" => ObservationSource::default(),
-            name => ObservationSource::from_name(name).ok_or_else(|| {
-                DataError::new(format!("source: `{name}` is not known"))
-                    .hint("known: manual, auto, detected, interpolated")
-            })?,
-        };
-        let (mut occluded, mut uncertain) = (false, false);
-        for flag in self.flags.map(field).unwrap_or_default().split(['+', '|']).map(str::trim) {
-            match flag {
-                "" => {}
-                OCCLUDED => occluded = true,
-                UNCERTAIN => uncertain = true,
-                other => {
-                    return Err(DataError::new(format!("flags: `{other}` is not known"))
-                        .hint("known: occluded, uncertain, joined by +"));
-                }
+        text.parse::<f64>().map_err(|_| DataError::new(format!("{name}: `{text}` is no number")))
+    };
+    let text = field(columns.timestamp);
+    let stamp = columns.stamp(text).map_err(|_| {
+        DataError::new(format!("timestamp_ns: `{text}` is no time in {}", columns.unit_name()))
+    })?;
+    let keyframe = match field(columns.keyframe) {
+        "1" | "true" | "True" => true,
+        "0" | "false" | "False" => false,
+        other => return Err(DataError::new(format!("keyframe: `{other}` is neither 0 nor 1"))),
+    };
+    let source = match columns.source.map(field).unwrap_or_default() {
+        "" => ObservationSource::default(),
+        name => ObservationSource::from_name(name).ok_or_else(|| {
+            DataError::new(format!("source: `{name}` is not known"))
+                .hint("known: manual, auto, detected, interpolated")
+        })?,
+    };
+    let (mut occluded, mut uncertain) = (false, false);
+    for flag in columns.flags.map(field).unwrap_or_default().split(['+', '|']).map(str::trim) {
+        match flag {
+            "" => {}
+            OCCLUDED => occluded = true,
+            UNCERTAIN => uncertain = true,
+            other => {
+                return Err(DataError::new(format!("flags: `{other}` is not known"))
+                    .hint("known: occluded, uncertain, joined by +"));
             }
         }
-        let px = Pixel::new(number(self.u_px, "u_px")?, number(self.v_px, "v_px")?);
-        Ok(Observation { source, keyframe, occluded, uncertain, line, ..Observation::manual(stamp, px) })
     }
+    let px = Pixel::new(number(columns.u_px, "u_px")?, number(columns.v_px, "v_px")?);
+    Ok(Observation { source, keyframe, occluded, uncertain, line, ..Observation::manual(stamp, px) })
 }
 
 fn csv_error(error: &csv::Error) -> DataError {

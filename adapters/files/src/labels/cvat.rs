@@ -4,42 +4,52 @@
 //! label is the point's name. What CVAT has no word for stands in attributes: `source` as in the other formats,
 //! `keyframe` (a segment starts; CVAT's own key frames are those that were not interpolated) and `uncertain`.
 
-use std::collections::BTreeMap;
-use std::io::{self, Write};
+use std::collections::{BTreeMap, BTreeSet};
 
 use roxmltree::{Document, Node, ParsingOptions};
 use vice_core::camera::Pixel;
-use vice_core::error::{DataError, DataResult};
-use vice_core::label::{LabelRow, LabelSet, Observation, ObservationSource, PointLabels};
+use vice_core::error::{DataError, DataResult, ErrorKind};
+use vice_core::label::{LabelRow, LabelSet, Observation, ObservationSource};
+use vice_core::suspicion::Suspicion;
 use vice_core::time::Stamp;
 
-use super::labels_from;
+use super::cvat_task::{self, FrameMap};
+use super::{LabelFile, labels_from};
+use crate::leniency::without_marks;
 
 /// From the corner of a pixel to its centre.
-const CENTRE_PX: f64 = 0.5;
+pub(super) const CENTRE_PX: f64 = 0.5;
 /// Elements, attributes and texts beyond which a file is refused: hours of labels have fewer.
 const MAX_NODES: u32 = 8_000_000;
 
 /// Reads the tracks of points of "CVAT for video 1.1". `frame_stamps` are the stamps of the camera's frames.
 ///
 /// Where a file does not come from here: a shape that CVAT interpolated is `interpolated`; a track's first visible point,
-/// and the first one after it was outside, is a key frame; of tracks with one label each is named `label-id`. Tracks of
-/// other shapes are passed over with a warning.
+/// and the first one after it was outside, is a key frame; of tracks with one label each is named `label-id`. The points
+/// of a skeleton are named by their own labels. Tracks of other shapes are passed over, which a suspicion says.
 ///
 /// # Errors
-/// [`DataError`] with the line if it is no such XML, a value cannot be read or a frame is none of the camera's, and as
-/// [`LabelSet::from_rows`].
+/// [`DataError`] with the line if it is no such XML, a value cannot be read or a frame is none of the camera's, if the
+/// task has another number of frames than the camera, and as [`LabelSet::from_rows`].
 pub fn read_cvat(bytes: &[u8], frame_stamps: &[Stamp]) -> DataResult<LabelSet> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    read_cvat_file(bytes, frame_stamps).map(|file| file.labels)
+}
+
+/// The same, with what was passed over and the size of the images that were labelled.
+///
+/// # Errors
+/// As [`read_cvat`].
+pub fn read_cvat_file(bytes: &[u8], frame_stamps: &[Stamp]) -> DataResult<LabelFile> {
     let text = std::str::from_utf8(bytes)
         .map_err(|e| DataError::new("the XML is not UTF-8 text").byte(e.valid_up_to() as u64))?;
+    let text = without_marks(text);
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
-    let document = Document::parse_with_options(text, options).map_err(|e| {
+    let document = Document::parse_with_options(&text, options).map_err(|e| {
         let line = u64::from(e.pos().row);
         DataError::new("the labels are not XML").line(line).because(e)
     })?;
     let root = document.root_element();
-    let mut lines = Lines { text, passed: 0, line: 1 };
+    let mut lines = Lines { text: &text, passed: 0, line: 1 };
     if !root.has_tag_name("annotations") {
         let problem = format!("the XML is <{}>, not CVAT's <annotations>", root.tag_name().name());
         return Err(DataError::new(problem).line(lines.of(&root)));
@@ -49,65 +59,114 @@ pub fn read_cvat(bytes: &[u8], frame_stamps: &[Stamp]) -> DataResult<LabelSet> {
         return Err(DataError::new("these are CVAT's annotations of images, which have no tracks")
             .hint("export the task as `CVAT for video 1.1`"));
     }
+    let with_points: Vec<Node<'_, '_>> =
+        tracks.iter().filter(|t| shapes(t).next().is_some()).copied().collect();
+    let mut file = LabelFile::default();
+    let frames = frame_map(&root, &with_points, frame_stamps.len(), &mut file)?;
     let mut uses: BTreeMap<&str, usize> = BTreeMap::new();
-    for track in tracks.iter().filter(|t| has_points(t)) {
-        *uses.entry(track.attribute("label").unwrap_or_default()).or_default() += 1;
+    for track in &with_points {
+        let names: BTreeSet<&str> = shapes(track).map(|(_, shape)| point_label(track, &shape)).collect();
+        names.into_iter().for_each(|name| *uses.entry(name).or_default() += 1);
     }
+    let reader = Reader { uses, frames, frame_stamps };
     let mut rows = Vec::new();
     for track in tracks {
         let line = lines.of(&track);
-        let label = track.attribute("label").unwrap_or_default();
-        if !has_points(&track) {
-            tracing::warn!("labels: line {line}: the track `{label}` has no points and is passed over");
+        if shapes(&track).next().is_none() {
+            let label = track.attribute("label").unwrap_or_default();
+            file.suspicions.add(
+                Suspicion::new("tracks-passed-over", "", "tracks without points are passed over")
+                    .evidence(format!("the first is `{label}` on line {line}")),
+            );
             continue;
         }
-        let point = if uses.get(label).is_some_and(|n| *n > 1) {
-            format!("{label}-{}", track.attribute("id").unwrap_or_default())
-        } else {
-            label.to_string()
-        };
-        read_track(&track, &point, frame_stamps, &mut lines, &mut rows)?;
+        reader.track(&track, &mut lines, &mut rows)?;
     }
-    labels_from(rows)
+    file.labels = labels_from(rows)?;
+    Ok(file)
 }
 
-fn has_points(track: &Node<'_, '_>) -> bool {
-    track.children().any(|n| n.has_tag_name("points"))
+/// The points of a track, on their own or in skeletons, each with the element that has its frame.
+fn shapes<'a, 'i>(track: &Node<'a, 'i>) -> impl Iterator<Item = (Node<'a, 'i>, Node<'a, 'i>)> {
+    track.children().flat_map(|child| {
+        let in_skeleton = child.has_tag_name("skeleton");
+        let alone = child.has_tag_name("points").then_some((child, child));
+        let points = in_skeleton.then(|| child.children().filter(|n| n.has_tag_name("points")));
+        alone.into_iter().chain(points.into_iter().flatten().map(move |points| (child, points)))
+    })
 }
 
-fn read_track(
-    track: &Node<'_, '_>,
-    point: &str,
-    frame_stamps: &[Stamp],
-    lines: &mut Lines<'_>,
-    rows: &mut Vec<LabelRow>,
-) -> DataResult<()> {
-    let made_by_tool = matches!(track.attribute("source"), Some("auto" | "semi-auto"));
-    // Nothing visible before: the next one starts a segment.
-    let mut starts = true;
-    for shape in track.children().filter(|n| n.has_tag_name("points")) {
-        let line = lines.of(&shape);
-        let row = Shape { node: shape, point };
-        if row.flag("outside").map_err(|e| e.line(line))? {
-            starts = true;
-            continue;
+/// A point of a skeleton has a label of its own.
+fn point_label<'a>(track: &Node<'a, '_>, shape: &Node<'a, '_>) -> &'a str {
+    shape.attribute("label").or_else(|| track.attribute("label")).unwrap_or_default()
+}
+
+/// Which frames the numbers are, by what the file says of its task.
+fn frame_map(
+    root: &Node<'_, '_>,
+    tracks: &[Node<'_, '_>],
+    camera_frames: usize,
+    file: &mut LabelFile,
+) -> DataResult<FrameMap> {
+    let tasks = cvat_task::tasks(root)?;
+    let of_tracks: BTreeSet<&str> = tracks.iter().filter_map(|t| t.attribute("task_id")).collect();
+    let Some(task) = cvat_task::used(&tasks, &of_tracks)? else { return Ok(FrameMap::Same) };
+    file.image_size_px = task.image_size_px;
+    let number = |(holder, shape): (Node<'_, '_>, Node<'_, '_>)| {
+        shape.attribute("frame").or_else(|| holder.attribute("frame"))?.parse::<usize>().ok()
+    };
+    let visible = |(_, shape): &(Node<'_, '_>, Node<'_, '_>)| shape.attribute("outside") != Some("1");
+    let numbers = tracks.iter().flat_map(|t| shapes(t)).filter(visible).filter_map(number).collect();
+    let (map, doubt) = cvat_task::map(task, &numbers, camera_frames)?;
+    file.suspicions.extend(doubt);
+    Ok(map)
+}
+
+struct Reader<'r> {
+    /// How many tracks have a point of a label.
+    uses: BTreeMap<&'r str, usize>,
+    frames: FrameMap,
+    frame_stamps: &'r [Stamp],
+}
+
+impl Reader<'_> {
+    fn track(&self, track: &Node<'_, '_>, lines: &mut Lines<'_>, rows: &mut Vec<LabelRow>) -> DataResult<()> {
+        let made_by_tool = matches!(track.attribute("source"), Some("auto" | "semi-auto"));
+        // Points that were visible before; of the others the next one starts a segment.
+        let mut visible: BTreeSet<&str> = BTreeSet::new();
+        for (holder, node) in shapes(track) {
+            let line = lines.of(&node);
+            let label = point_label(track, &node);
+            let point = match self.uses.get(label) {
+                Some(n) if *n > 1 => format!("{label}-{}", track.attribute("id").unwrap_or_default()),
+                _ => label.to_string(),
+            };
+            let row = Shape { node, holder, point: &point };
+            if row.flag("outside").map_err(|e| e.line(line))? {
+                visible.remove(label);
+                continue;
+            }
+            let drawn =
+                node.attribute("keyframe").is_none() || row.flag("keyframe").map_err(|e| e.line(line))?;
+            let default_source = match (drawn, made_by_tool) {
+                (false, _) => ObservationSource::Interpolated,
+                (true, true) => ObservationSource::Auto,
+                (true, false) => ObservationSource::Manual,
+            };
+            let starts = visible.insert(label);
+            let observation =
+                row.observation(self, default_source, starts, line).map_err(|e| e.line(line))?;
+            rows.push(LabelRow { point, observation });
         }
-        let default_source = match (row.flag("keyframe").map_err(|e| e.line(line))?, made_by_tool) {
-            (false, _) if shape.attribute("keyframe").is_some() => ObservationSource::Interpolated,
-            (_, true) => ObservationSource::Auto,
-            _ => ObservationSource::Manual,
-        };
-        let observation =
-            row.observation(frame_stamps, default_source, starts, line).map_err(|e| e.line(line))?;
-        starts = false;
-        rows.push(LabelRow { point: point.to_string(), observation });
+        Ok(())
     }
-    Ok(())
 }
 
 /// One `<points>` of a track.
 struct Shape<'a, 'input> {
     node: Node<'a, 'input>,
+    /// The element that has its frame: itself, or its skeleton.
+    holder: Node<'a, 'input>,
     point: &'a str,
 }
 
@@ -142,15 +201,25 @@ impl Shape<'_, '_> {
 
     fn observation(
         &self,
-        frame_stamps: &[Stamp],
+        reader: &Reader<'_>,
         default_source: ObservationSource,
         starts: bool,
         line: u64,
     ) -> DataResult<Observation> {
-        let frame = self.node.attribute("frame").unwrap_or_default();
-        let index = frame.parse::<usize>().map_err(|_| self.wrong("the frame", frame, "a number"))?;
-        let stamp = *frame_stamps.get(index).ok_or_else(|| {
-            let (point, known) = (self.point, frame_stamps.len());
+        let frame =
+            self.node.attribute("frame").or_else(|| self.holder.attribute("frame")).unwrap_or_default();
+        let number = frame.parse::<usize>().map_err(|_| self.wrong("the frame", frame, "a number"))?;
+        let index = reader.frames.index(number).ok_or_else(|| {
+            DataError::of_kind(
+                ErrorKind::Contradictory,
+                format!(
+                    "point {}: frame {number} is none of the task's by its start_frame and step",
+                    self.point
+                ),
+            )
+        })?;
+        let stamp = *reader.frame_stamps.get(index).ok_or_else(|| {
+            let (point, known) = (self.point, reader.frame_stamps.len());
             DataError::new(format!("point {point}: frame {index} is not among the camera's {known} frames"))
                 .hint("is this the data set that was labelled?")
         })?;
@@ -195,115 +264,6 @@ impl Lines<'_> {
         self.passed = self.passed.max(at);
         self.line
     }
-}
-
-/// Writes "CVAT for video 1.1". `frame_stamps` are the stamps of the camera's frames, which CVAT counts.
-///
-/// Where a point is not labelled for longer than is usual between its observations, it is said to be outside, so that
-/// CVAT does not carry it on. The confidence and the tracker's version have no place there.
-///
-/// # Errors
-/// [`io::Error`] of the writer, and for a stamp that is no frame or a name that XML cannot hold.
-pub fn write_cvat(writer: &mut dyn Write, labels: &LabelSet, frame_stamps: &[Stamp]) -> io::Result<()> {
-    writeln!(writer, "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<annotations>\n  <version>1.1</version>")?;
-    writeln!(writer, "  <meta>\n    <task>")?;
-    if let Some(name) = &labels.dataset {
-        writeln!(writer, "      <name>{}</name>", escaped(name)?)?;
-    }
-    writeln!(
-        writer,
-        "      <size>{}</size>\n      <mode>interpolation</mode>\n      <labels>",
-        frame_stamps.len()
-    )?;
-    for point in labels.points() {
-        writeln!(
-            writer,
-            "        <label>\n          <name>{}</name>\n          <type>points</type>",
-            escaped(&point.name)?
-        )?;
-        writeln!(writer, "          <attributes>")?;
-        for (name, kind, values) in [
-            ("source", "select", "manual\nauto\ndetected\ninterpolated"),
-            ("keyframe", "checkbox", "false"),
-            ("uncertain", "checkbox", "false"),
-        ] {
-            writeln!(
-                writer,
-                "            <attribute><name>{name}</name><mutable>True</mutable><input_type>{kind}</input_type>\
-                 <values>{values}</values></attribute>"
-            )?;
-        }
-        writeln!(writer, "          </attributes>\n        </label>")?;
-    }
-    writeln!(writer, "      </labels>\n    </task>\n  </meta>")?;
-    for (id, point) in labels.points().iter().enumerate() {
-        write_track(writer, id, point, frame_stamps)?;
-    }
-    writeln!(writer, "</annotations>")
-}
-
-fn write_track(writer: &mut dyn Write, id: usize, point: &PointLabels, stamps: &[Stamp]) -> io::Result<()> {
-    writeln!(writer, "  <track id=\"{id}\" label=\"{}\" source=\"manual\">", escaped(&point.name)?)?;
-    let frames = point.observations.iter().map(|o| {
-        stamps.binary_search(&o.stamp).map_err(|_| {
-            let problem = format!("point {}: {} ns is none of the camera's frames", point.name, o.stamp);
-            io::Error::new(io::ErrorKind::InvalidData, problem)
-        })
-    });
-    let frames: Vec<usize> = frames.collect::<io::Result<_>>()?;
-    // The step between labelled frames that is seen most often: labels at 10 Hz of frames at 20 Hz have gaps of two.
-    let mut steps: BTreeMap<usize, usize> = BTreeMap::new();
-    for pair in frames.windows(2) {
-        *steps.entry(pair[1] - pair[0]).or_default() += 1;
-    }
-    let usual =
-        steps.into_iter().max_by_key(|(step, count)| (*count, usize::MAX - step)).map_or(1, |(s, _)| s);
-    for (i, (o, frame)) in point.observations.iter().zip(&frames).enumerate() {
-        let place = format!("{:?},{:?}", o.px.u + CENTRE_PX, o.px.v + CENTRE_PX);
-        let occluded = u8::from(o.occluded);
-        writeln!(
-            writer,
-            "    <points frame=\"{frame}\" outside=\"0\" occluded=\"{occluded}\" keyframe=\"1\" points=\"{place}\" z_order=\"0\">"
-        )?;
-        for (name, value) in [
-            ("source", o.source.name()),
-            ("keyframe", if o.keyframe { "true" } else { "false" }),
-            ("uncertain", if o.uncertain { "true" } else { "false" }),
-        ] {
-            writeln!(writer, "      <attribute name=\"{name}\">{value}</attribute>")?;
-        }
-        writeln!(writer, "    </points>")?;
-        let next = frames.get(i + 1).copied().unwrap_or(stamps.len());
-        let respawned = point.observations.get(i + 1).is_some_and(|n| n.keyframe);
-        if next > frame + 1 && (next > frame + usual || respawned || i + 1 == frames.len()) {
-            writeln!(
-                writer,
-                "    <points frame=\"{}\" outside=\"1\" occluded=\"0\" keyframe=\"1\" points=\"{place}\" z_order=\"0\"/>",
-                frame + 1
-            )?;
-        }
-    }
-    writeln!(writer, "  </track>")
-}
-
-/// Text as XML holds it, in an element or an attribute.
-fn escaped(text: &str) -> io::Result<String> {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\t' | '\n' | '\r' => out.push_str(&format!("&#{};", u32::from(c))),
-            '\0'..='\u{1f}' | '\u{fffe}' | '\u{ffff}' => {
-                let problem = format!("the name {text:?} has a character that XML cannot hold");
-                return Err(io::Error::new(io::ErrorKind::InvalidData, problem));
-            }
-            other => out.push(other),
-        }
-    }
-    Ok(out)
 }
 
 #[cfg(test)]

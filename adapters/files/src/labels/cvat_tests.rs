@@ -1,3 +1,4 @@
+use super::super::write_cvat;
 use super::*;
 use proptest::prelude::*;
 
@@ -135,4 +136,99 @@ proptest! {
         }
         let _ = read_cvat(&xml, &stamps(5));
     }
+}
+
+fn with_meta(meta: &str, frames: &[usize], task: &str) -> String {
+    let points: String = frames
+        .iter()
+        .map(|f| {
+            format!("<points frame=\"{f}\" keyframe=\"1\" outside=\"0\" occluded=\"0\" points=\"1,2\"/>")
+        })
+        .collect();
+    format!(
+        "<annotations><meta>{meta}</meta><track id=\"0\" label=\"p\" source=\"manual\"{task}>{points}</track></annotations>"
+    )
+}
+
+#[test]
+fn frame_numbers_are_the_cameras_or_refused() {
+    let frames = stamps(20);
+    let task = |more: &str| format!("<task><id>7</id><name>desk</name>{more}</task>");
+    let read = |meta: &str, numbers: &[usize], of: &str| {
+        read_cvat_file(with_meta(meta, numbers, of).as_bytes(), &frames).map_err(|e| e.to_string())
+    };
+    let indices = |file: LabelFile| -> Vec<usize> {
+        let stamps = file.labels.points()[0].observations.iter().map(|o| o.stamp);
+        stamps.map(|s| frames.binary_search(&s).unwrap()).collect()
+    };
+    let error = read(&task("<size>10</size>"), &[0, 9], "").unwrap_err();
+    assert!(error.contains("the task has 10 frames, the camera 20") && error.contains("step=2"), "{error}");
+    // As CVAT writes a video of every second frame, and as others do.
+    let stepped = task(
+        "<size>10</size><start_frame>0</start_frame><stop_frame>19</stop_frame><frame_filter>step=2</frame_filter>",
+    );
+    assert_eq!(indices(read(&stepped, &[0, 2, 18], "").unwrap()), [0, 2, 18]);
+    assert_eq!(indices(read(&stepped, &[0, 1, 9], "").unwrap()), [0, 2, 18]);
+    let doubtful = read(&stepped, &[0, 2, 4], "").unwrap();
+    assert!(doubtful.suspicions.iter().any(|s| s.code == "frame-numbers"));
+    // A project's export, in which tracks name their task.
+    let project = |more: &str| {
+        format!(
+            "<project><id>1</id><name>both</name><tasks>{}{more}</tasks></project>",
+            task("<size>20</size>")
+        )
+    };
+    assert_eq!(indices(read(&project(""), &[3], " task_id=\"7\"").unwrap()), [3]);
+    let other = "<task><id>8</id><name>hall</name><size>90</size></task>";
+    assert_eq!(indices(read(&project(other), &[3], " task_id=\"7\"").unwrap()), [3]);
+    let error = read(&project(other), &[3], " task_id=\"8\"").unwrap_err();
+    assert!(error.contains("the task has 90 frames, the camera 20"), "{error}");
+    let error = read(&project(other), &[3], "").unwrap_err();
+    assert!(error.contains("2 tasks (`desk`, `hall`)"), "{error}");
+    // A job of the second half.
+    let job = "<job><id>3</id><size>10</size><start_frame>10</start_frame><stop_frame>19</stop_frame></job>";
+    assert_eq!(indices(read(job, &[10, 19], "").unwrap()), [10, 19]);
+    let error = read(&task("<size>10</size><frame_filter>every other</frame_filter>"), &[0], "").unwrap_err();
+    assert!(error.contains("only step=N is read"), "{error}");
+    let sized = task("<size>20</size><original_size><width>320</width><height>240</height></original_size>");
+    let file = read(&sized, &[1], "").unwrap();
+    assert!(file.check_image_size(320, 240).is_ok());
+    let error = file.check_image_size(640, 480).unwrap_err().to_string();
+    assert!(error.contains("320x240") && error.contains("640x480"), "{error}");
+}
+
+#[test]
+fn points_of_skeletons_have_their_own_names() {
+    let skeleton = |frame: usize, more: &str| {
+        format!(
+            "<skeleton frame=\"{frame}\" keyframe=\"1\" z_order=\"0\"{more}>\
+             <points label=\"a\" keyframe=\"1\" outside=\"0\" occluded=\"0\" points=\"1.5,2.5\"/>\
+             <points label=\"b\" keyframe=\"1\" outside=\"{}\" occluded=\"1\" points=\"3.5,4.5\"/></skeleton>",
+            usize::from(frame == 1)
+        )
+    };
+    let track = |id: usize| {
+        format!(
+            "<track id=\"{id}\" label=\"board\">{}{}{}</track>",
+            skeleton(0, ""),
+            skeleton(1, ""),
+            skeleton(2, "")
+        )
+    };
+    let read = |tracks: &str| {
+        let labels =
+            read_cvat(format!("<annotations>{tracks}</annotations>").as_bytes(), &stamps(5)).unwrap();
+        let names: Vec<String> = labels.points().iter().map(|p| p.name.clone()).collect();
+        (names, labels)
+    };
+    let (names, labels) = read(&track(0));
+    assert_eq!(names, ["a", "b"]);
+    let b: Vec<(bool, bool)> =
+        labels.points()[1].observations.iter().map(|o| (o.keyframe, o.occluded)).collect();
+    assert_eq!(b, [(true, true), (true, true)], "outside in between, so that it starts again");
+    assert_eq!(labels.points()[0].observations.iter().filter(|o| o.keyframe).count(), 1);
+    assert_eq!(read(&format!("{}{}", track(0), track(3))).0, ["a-0", "a-3", "b-0", "b-3"]);
+    // Beside a track of points of the same label.
+    let alone = "<track id=\"9\" label=\"a\"><points frame=\"0\" outside=\"0\" keyframe=\"1\" points=\"1,1\"/></track>";
+    assert_eq!(read(&format!("{}{alone}", track(0))).0, ["a-0", "a-9", "b"]);
 }

@@ -7,24 +7,30 @@
 //! | CVAT | "CVAT for video 1.1", tracks of points, of the annotation tool CVAT; counts frames, as the pickle does |
 //! | pickle | `{point: {frame index: (array([x, y]), is_keyframe)}}`, as the paper's authors stored them; read only |
 
+mod csv_columns;
 mod csv_file;
 mod cvat;
+mod cvat_task;
+mod cvat_write;
 mod json_file;
 mod ndarray;
 mod pickle;
 mod pickle_machine;
 mod pickle_text;
 mod pickle_values;
+mod rounded;
 
 use std::io::{self, Write};
 use std::path::Path;
 
-use vice_core::error::{DataError, DataResult};
+use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::label::{LabelError, LabelRow, LabelSet};
+use vice_core::suspicion::{Suspicion, Suspicions};
 use vice_core::time::Stamp;
 
-pub use csv_file::{read_csv, write_csv};
-pub use cvat::{read_cvat, write_cvat};
+pub use csv_file::{read_csv, read_csv_file, write_csv};
+pub use cvat::{read_cvat, read_cvat_file};
+pub use cvat_write::write_cvat;
 pub use json_file::{LABELS_SCHEMA, read_json, read_json_or_none, write_json};
 pub use pickle::read_pickle;
 
@@ -77,7 +83,39 @@ impl LabelFormat {
     }
 }
 
-/// Reads a file of labels in the format its content shows.
+/// Labels as a file has them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LabelFile {
+    /// The labels.
+    pub labels: LabelSet,
+    /// What was left out, and what looks wrong.
+    pub suspicions: Suspicions,
+    /// Columns and rows of the images that were labelled, where the file says so.
+    pub image_size_px: Option<[u32; 2]>,
+}
+
+impl LabelFile {
+    fn of(labels: LabelSet) -> Self {
+        Self { labels, ..Self::default() }
+    }
+
+    /// Checks that the images that were labelled have the size that the camera is calibrated for.
+    ///
+    /// # Errors
+    /// [`DataError`] with both sizes.
+    pub fn check_image_size(&self, width: u32, height: u32) -> DataResult<()> {
+        match self.image_size_px {
+            Some([w, h]) if (w, h) != (width, height) => Err(DataError::of_kind(
+                ErrorKind::Contradictory,
+                format!("the images that were labelled have {w}x{h} pixels, the camera's calibration is of {width}x{height}"),
+            )
+            .hint("labels of images that were made smaller are pixels of those images")),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Reads a file of labels in the format its content shows. What looks wrong is logged: see [`read_file`].
 ///
 /// `frame_stamps` are the stamps of the camera's frames; only the authors' pickle and CVAT, which count frames, need
 /// them.
@@ -85,19 +123,40 @@ impl LabelFormat {
 /// # Errors
 /// [`DataError`] with path and line if the file cannot be read or a row cannot be used.
 pub fn read(path: impl AsRef<Path>, frame_stamps: Option<&[Stamp]>) -> DataResult<LabelSet> {
+    let file = read_file(path, frame_stamps)?;
+    crate::leniency::log(&file.suspicions);
+    Ok(file.labels)
+}
+
+/// As [`read`], with what was left out and what looks wrong.
+///
+/// # Errors
+/// As [`read`], and where stamps were rounded, so that they no longer tell frames apart.
+pub fn read_file(path: impl AsRef<Path>, frame_stamps: Option<&[Stamp]>) -> DataResult<LabelFile> {
     let path = path.as_ref();
     let bytes = read_bytes(path)?;
-    let labels = match LabelFormat::of_content(&bytes) {
-        LabelFormat::Csv => read_csv(&bytes),
-        LabelFormat::Json => read_json(&bytes),
-        LabelFormat::Pickle => {
-            frame_stamps.ok_or_else(|| counts_frames("a pickle")).and_then(|s| read_pickle(&bytes, s))
-        }
+    if let Some(what) = crate::not_text::what(&bytes) {
+        return Err(crate::not_text::error(what).at(path));
+    }
+    let file = match LabelFormat::of_content(&bytes) {
+        LabelFormat::Csv => read_csv_file(&bytes),
+        LabelFormat::Json => read_json(&bytes).map(LabelFile::of),
+        LabelFormat::Pickle => frame_stamps
+            .ok_or_else(|| counts_frames("a pickle"))
+            .and_then(|s| read_pickle(&bytes, s))
+            .map(LabelFile::of),
         LabelFormat::Cvat => {
-            frame_stamps.ok_or_else(|| counts_frames("CVAT")).and_then(|s| read_cvat(&bytes, s))
+            frame_stamps.ok_or_else(|| counts_frames("CVAT")).and_then(|s| read_cvat_file(&bytes, s))
         }
     };
-    labels.map_err(|e| e.at(path))
+    let mut file = file.map_err(|e| e.at(path))?;
+    if let Some(frames) = frame_stamps {
+        rounded::check(&file.labels, frames).map_err(|e| e.at(path))?;
+    }
+    let about = path.display().to_string();
+    let named = |s: Suspicion| if s.about.is_empty() { Suspicion { about: about.clone(), ..s } } else { s };
+    file.suspicions = file.suspicions.into_iter().map(named).collect();
+    Ok(file)
 }
 
 fn counts_frames(what: &str) -> DataError {

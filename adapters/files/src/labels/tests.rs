@@ -51,7 +51,7 @@ fn bad_rows_are_named() {
         assert!(error.to_string().contains(expected), "{error}");
         assert_eq!(error.place(), Some(Place::Line(line)), "{error}");
     };
-    says("0,2,nan,3,0,,", 3, "not finite");
+    says("0,2,nan,3,1,,", 3, "not finite");
     says("0,2,2,inf,0,,", 3, "not finite");
     says("0,1,2,3,0,,", 3, "twice");
     says("0,x,2,3,0,,", 3, "timestamp_ns: `x`");
@@ -270,4 +270,75 @@ proptest! {
         }
         let _ = read_pickle(&pickle, &stamps(4));
     }
+}
+
+#[test]
+fn columns_of_labels_have_other_names_and_units_too() {
+    for text in [
+        "point,timestamp_ns,u_px,v_px,keyframe\na,1500000000,1.5,2.5,1\n",
+        "Point;t_s;u;v;key_frame\na;1.5;1.5;2.5;1\n",
+        "label\ttimestamp [us]\tx [px]\ty [px]\tis_keyframe\na\t1500000\t1.5\t2.5\ttrue\n",
+        "\u{feff}# made by hand\nid_of_nothing,point_id,stamp_ms,pixel_x,pixel_y,keyframe\n7,a,1500,1.5,2.5,1\n",
+        "point,timestamp,u_px,v_px,keyframe\n\u{feff}a,1.5,1.5,2.5,1\n",
+    ] {
+        let file = read_csv_file(text.as_bytes()).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        let point = &file.labels.points()[0];
+        let o = point.observations[0];
+        assert_eq!(
+            (point.name.as_str(), o.stamp.as_nanos(), o.px),
+            ("a", 1_500_000_000, Pixel::new(1.5, 2.5)),
+            "{text}"
+        );
+        assert_eq!(file.suspicions.iter().any(|s| s.evidence == "id_of_nothing"), text.contains("nothing"));
+    }
+    for (heading, expected) in [
+        ("point,timestamp_ns,u,x,v,keyframe", "`u` and `x` could both be u_px"),
+        ("point,stamp_ns,time_s,u,v,keyframe", "could both be the stamps"),
+        ("point,u,v,keyframe", "the column timestamp_ns is missing"),
+    ] {
+        let error = csv(&format!("{heading}\n")).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+}
+
+#[test]
+fn labels_without_a_pixel_are_gaps_and_rounded_stamps_are_named() {
+    let head = "point,timestamp_ns,u_px,v_px,keyframe\n";
+    let file = read_csv_file(format!("{head}a,1,1,2,1\na,2,nan,NaN,0\na,3,NaN,1,0\na,4,1,2,0\n").as_bytes())
+        .unwrap();
+    assert_eq!(file.labels.observation_count(), 2);
+    assert_eq!(
+        file.suspicions.iter().map(|s| (s.code.as_str(), s.count)).collect::<Vec<_>>(),
+        [("rows-left-out", 2)]
+    );
+    for rows in [
+        "a,1.60000E+18,1,2,1\na,1.60000E+18,1,2,0\n",
+        "a,1.60000E+18,1,2,1\nb,1.60000E+18,1,2,0\n",
+        "a,1.60000e+18,1,2,1\nb,1.6e+18,1,2,0\na,1.6E18,1,2,0\n",
+    ] {
+        let error = csv(&format!("{head}{rows}")).unwrap_err().to_string();
+        assert!(error.contains("rounded to 6 digits, as a spreadsheet does"), "{error}");
+    }
+    // Fifteen digits, and those of a double, beside the camera's frames.
+    let folder = tempfile::tempdir().unwrap();
+    let frames: Vec<Stamp> =
+        (0..5).map(|i| Stamp::from_nanos(1_403_715_280_562_142_976 + 50_000_064 * i)).collect();
+    for (name, text, digits) in [
+        ("a.csv", format!("{head}a,1403715280562140000,1,2,1\na,1403715280612140000,1,2,0\n"), 15),
+        ("a.csv", format!("{head}a,1.40371528056214E+18,1,2,1\n"), 15),
+        (
+            "a.json",
+            r#"{"schema": "vice.labels/1", "points": [{"name": "a", "observations": [{"timestamp_ns": 1403715280562143000, "px": [1, 2], "keyframe": true}]}]}"#.to_string(),
+            16,
+        ),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, &text).unwrap();
+        let error = read(&path, Some(&frames)).unwrap_err().to_string();
+        assert!(error.contains(&format!("rounded to {digits} digits")) && error.contains(name), "{error}");
+        assert!(read(&path, None).is_ok());
+    }
+    std::fs::write(folder.path().join("a.csv"), b"PK\x03\x04rest").unwrap();
+    let error = read(folder.path().join("a.csv"), None).unwrap_err().to_string();
+    assert!(error.contains("ZIP archive (also .npz and .xlsx are)"), "{error}");
 }

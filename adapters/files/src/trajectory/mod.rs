@@ -2,24 +2,38 @@
 //!
 //! | format | a row | stamps |
 //! | --- | --- | --- |
-//! | TUM | `t tx ty tz qx qy qz qw`, further columns ignored | decimal seconds, read exactly |
+//! | TUM | `t tx ty tz qx qy qz qw` | decimal seconds, read exactly |
 //! | EuRoC | `t,px,py,pz,qw,qx,qy,qz` and optionally `v`, gyro bias, accel bias | nanoseconds |
-//! | KITTI | 12 numbers, the upper rows of a 4x4 matrix | seconds in a file of times beside it |
+//! | any table | columns by their names, above the rows or in a comment; see [`crate::columns`] | as named, else by size |
+//! | KITTI | 12 numbers, the upper rows of a 4x4 matrix, or all 16 | seconds in a file of times beside it |
+//! | KITTI and more | the same behind a running number, or behind a stamp | of that number in the times, or its own |
 //! | relative | `t0 t1 tx ty tz qx qy qz qw` of `T^{B_t1,B_t0}` | decimal seconds |
+//!
+//! A column more or less than these is never guessed away. What is left out or repaired is in
+//! [`TrajectoryFile::suspicions`], by the rules of [`crate::leniency`].
 //!
 //! Metres and `world_from_body`. Relative motions are the paper's primary input; they look like TUM rows with further
 //! columns, so they are asked for by name: `rel:FILE`.
 
+mod layout;
+mod matrix;
 mod parse;
+mod plausible;
+mod relative;
 mod write;
 
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use vice_core::error::{DataError, DataResult};
+use vice_core::suspicion::{Suspicion, Suspicions};
 use vice_core::trajectory::{Trajectory, TrajectoryError};
 
-pub use parse::{Parsed, read_relative_rows, read_rows};
+use crate::leniency::Leniency;
+
+pub use matrix::{MatrixPoses, MatrixStamps};
+pub use parse::{Parsed, PoseRows, read_micros_rows, read_rows};
+pub use relative::read_relative_rows;
 pub use write::{write_euroc, write_kitti, write_relative, write_tum};
 
 /// A format of trajectories.
@@ -68,6 +82,45 @@ pub struct TrajectoryFile {
     pub trajectory: Trajectory,
     /// Velocity and biases, one for each pose, where the file has all 17 columns of EuRoC.
     pub inertial: Option<Vec<InertialRow>>,
+    /// What was left out or repaired, and what looks wrong. About the file, once it was read from one.
+    pub suspicions: Suspicions,
+    pub(crate) lenient: Leniency,
+    /// Columns of a row, where those beyond the eighth were passed over without names.
+    pub(crate) passed_over: Option<usize>,
+}
+
+impl TrajectoryFile {
+    fn new(format: TrajectoryFormat, trajectory: Trajectory) -> Self {
+        Self {
+            format,
+            trajectory,
+            inertial: None,
+            suspicions: Suspicions::new(),
+            lenient: Leniency::new(),
+            passed_over: None,
+        }
+    }
+
+    /// As [`Self::about`], for poses without a clock.
+    fn counted(mut self, path: &Path) -> Self {
+        self.suspicions.extend(self.lenient.suspicions(&path.display().to_string()));
+        self
+    }
+
+    /// Puts what was met into words, now that the name of the file is known.
+    fn about(mut self, path: &Path) -> Self {
+        let about = path.display().to_string();
+        self.suspicions.extend(self.lenient.suspicions(&about));
+        if let Some(columns) = self.passed_over {
+            self.suspicions.add(
+                Suspicion::new("columns-passed-over", &about, "columns without names are passed over")
+                    .evidence(format!("{columns} columns, of which the first 8 are read"))
+                    .advice("name the columns in a first line, such as timestamp tx ty tz qx qy qz qw"),
+            );
+        }
+        self.suspicions.extend(plausible::suspicion(&self.trajectory, &about));
+        self
+    }
 }
 
 /// How to read what a file alone does not say.
@@ -93,16 +146,21 @@ pub fn read_spec(spec: &str, options: &ReadOptions) -> DataResult<TrajectoryFile
 /// Reads a file of absolute poses in the format its content shows.
 ///
 /// # Errors
-/// [`DataError`] with path and line for rows that are not finite, not sorted, duplicate, not unit quaternions or too
-/// short, for an empty file, and for a KITTI file without times.
+/// [`DataError`] with path and line for rows that are infinite, not sorted, not unit quaternions within 1 %, or of
+/// another width, for names that contradict, for an empty file, and for a KITTI file without times.
 pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> DataResult<TrajectoryFile> {
     let path = path.as_ref();
     let parsed = read_rows(crate::rows::open(path)?).map_err(|e| e.at(path))?;
     match parsed {
-        Parsed::Stamped(file) => Ok(file),
-        Parsed::Kitti(poses) => {
-            let trajectory = parse::with_times(path, poses, options)?;
-            Ok(TrajectoryFile { format: TrajectoryFormat::Kitti, trajectory, inertial: None })
+        Parsed::Stamped(file) => Ok(file.about(path)),
+        Parsed::Kitti(poses, lenient) => {
+            let timed = !matches!(poses.stamps, MatrixStamps::Stamps(_));
+            let mut file =
+                TrajectoryFile::new(TrajectoryFormat::Kitti, matrix::with_times(path, poses, options)?);
+            file.lenient = lenient;
+            // Rows counted as seconds have no speed.
+            let counted = timed && options.index_as_seconds;
+            Ok(if counted { file.counted(path) } else { file.about(path) })
         }
     }
 }
@@ -113,7 +171,7 @@ pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> DataResult<Traject
 /// As [`read`].
 pub fn read_euroc(path: impl AsRef<Path>) -> DataResult<TrajectoryFile> {
     let path = path.as_ref();
-    parse::read_euroc_rows(crate::rows::open(path)?).map_err(|e| e.at(path))
+    parse::read_euroc_rows(crate::rows::open(path)?).map(|file| file.about(path)).map_err(|e| e.at(path))
 }
 
 /// Reads a file of relative motions and chains them from the identity.
@@ -122,7 +180,12 @@ pub fn read_euroc(path: impl AsRef<Path>) -> DataResult<TrajectoryFile> {
 /// [`DataError`] with path and line, as [`read`], and where a motion does not start at the end of the one before.
 pub fn read_relative(path: impl AsRef<Path>) -> DataResult<TrajectoryFile> {
     let path = path.as_ref();
-    read_relative_rows(crate::rows::open(path)?).map_err(|e| e.at(path))
+    read_relative_rows(crate::rows::open(path)?).map(|file| file.about(path)).map_err(|e| e.at(path))
+}
+
+/// Whether a table begins with poses, by the names above it or its first rows.
+pub fn looks_like_poses(path: impl AsRef<Path>) -> bool {
+    crate::rows::open(path).and_then(parse::first_is_pose).unwrap_or(false)
 }
 
 /// An error of the core, which counts rows, as one of a file, which counts lines.
@@ -137,5 +200,7 @@ pub(crate) fn at_line(error: &TrajectoryError, lines: &[u64]) -> DataError {
     }
 }
 
+#[cfg(test)]
+mod dialect_tests;
 #[cfg(test)]
 mod tests;

@@ -35,7 +35,7 @@ fn parse(text: &str) -> DataResult<Parsed> {
 fn stamped(text: &str) -> TrajectoryFile {
     match parse(text).unwrap() {
         Parsed::Stamped(file) => file,
-        Parsed::Kitti(_) => panic!("not a KITTI file"),
+        Parsed::Kitti(..) => panic!("not a KITTI file"),
     }
 }
 
@@ -65,8 +65,8 @@ fn formats_are_told_by_content() {
     let millis = format!("1403715273262,0,0,0,1,0,0,0,{}0\n", "0,".repeat(8));
     assert_eq!(stamped(&millis).format, TrajectoryFormat::Euroc);
 
-    let Parsed::Kitti(poses) = parse("0 -1 0 5 1 0 0 6 0 0 1 7\n").unwrap() else { panic!() };
-    assert_eq!(poses[0].translation(), Vector3::new(5.0, 6.0, 7.0));
+    let Parsed::Kitti(found, _) = parse("0 -1 0 5 1 0 0 6 0 0 1 7\n").unwrap() else { panic!() };
+    assert_eq!(found.poses[0].translation(), Vector3::new(5.0, 6.0, 7.0));
 }
 
 #[test]
@@ -78,10 +78,14 @@ fn bad_rows_are_named() {
         let error = read(&path, &ReadOptions::default()).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
     };
-    says(&format!("# head\n\n{good}3 0 0 nan 0 0 0 1\n"), "t.txt:5: column 4: nan is not finite");
+    says("# head\n\n3 0 0 nan 0 0 0 1\n", "t.txt:3: none of the 1 rows has a pose");
+    says(&format!("{good}nan 0 0 0 0 0 0 1\n"), "t.txt:3: column 1");
     says(&format!("{good}inf 0 0 0 0 0 0 1\n"), "t.txt:3: column 1");
     says(&format!("{good}3 0 0 0 0 inf 0 1\n"), "t.txt:3: column 6: inf is not finite");
-    says(&format!("{good}# x\n2 0 0 0 0 0 0 1\n"), "t.txt:4: stamp 2000000000 ns appears twice");
+    says(
+        "1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n",
+        "t.txt:2: stamp 1000000000 ns appears twice: 2 of 3",
+    );
     says(&format!("{good}1.5 0 0 0 0 0 0 1\n"), "t.txt:3: stamp 1500000000 ns is earlier");
     says(&format!("{good}3 0 0 0 0 0 0 2\n"), "t.txt:3: the quaternion has length 2");
     says(&format!("{good}3 0 0 0 0 0 0 0\n"), "t.txt:3: the quaternion has length 0");

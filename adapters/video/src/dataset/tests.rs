@@ -73,7 +73,7 @@ fn what_is_not_there_is_named() {
     fs::write(folder.path().join("imu.csv"), "5,1,2,3,4,5\n").unwrap();
     assert!(dataset.imu().unwrap_err().to_string().contains("imu.csv:1: expected 7 columns"));
     fs::write(folder.path().join("imu.csv"), "5,1,2,3,4,5,6\n5,1,2,3,4,5,6\n").unwrap();
-    assert!(dataset.imu().unwrap_err().to_string().contains("imu.csv:2: stamp 5 ns is not later"));
+    assert!(dataset.imu().unwrap_err().to_string().contains("imu.csv:2: stamp 5 ns appears twice"));
     fs::remove_file(folder.path().join("stamps.txt")).unwrap();
     let stamps = dataset.frames("camera").unwrap_err().to_string();
     assert!(stamps.contains("stamps.txt: no such file"), "{stamps}");
