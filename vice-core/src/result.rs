@@ -2,6 +2,10 @@
 //!
 //! Units stand in the names. A number that could not be had is null, never NaN.
 
+mod held;
+
+pub use held::{AsideReason, Figure, HeldPart, SetAside, WindowPart};
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -116,6 +120,21 @@ pub struct PixelPart {
     pub rmse_px: BTreeMap<usize, Option<SubsetRmse>>,
     /// RMSE_2D of all points together, pixels; null where nothing was scored.
     pub pooled_rmse_px: Option<f64>,
+    /// RMSE_2D of the labels that hold, pixels; null where none does.
+    #[serde(default)]
+    pub held_rmse_px: Option<f64>,
+    /// Its 95 % interval, low and high, pixels; null where there is none.
+    #[serde(default)]
+    pub interval_95: Option<[f64; 2]>,
+    /// What these two rest on; left out where nothing was scored.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held: Option<HeldPart>,
+    /// The error by age since the key frame.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub by_age: Vec<WindowPart>,
+    /// The error by metres that the camera moved since the key frame.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub by_distance: Vec<WindowPart>,
     /// Number of scored samples.
     pub scored: u64,
     /// What could not be scored, and why.

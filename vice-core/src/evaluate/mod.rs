@@ -13,6 +13,7 @@ mod curves;
 mod score;
 mod select;
 mod skip;
+mod spread;
 mod streams;
 pub(crate) mod trial;
 
@@ -31,7 +32,10 @@ use crate::error::{DataError, DataResult};
 use crate::frames::BodyFromCamera;
 use crate::metrics::align::Alignment;
 use crate::metrics::pixel::{pooled_rmse_px, subset_rmse_px};
-use crate::result::{DatasetPart, PixelPart, PointName, ResultDocument, SCHEMA, Sample, Settings, Skip};
+use crate::result::{
+    DatasetPart, PixelPart, PointName, ResultDocument, Role, SCHEMA, Sample, Settings, Skip,
+};
+use crate::suspicion::Suspicions;
 use crate::time::{Span, Stamp};
 
 /// Why nothing could be evaluated.
@@ -201,9 +205,14 @@ fn run(
         .map(|s| s.poses_at(evaluation.frames, &selection.frames, evaluation.max_gap))
         .collect();
 
+    // How far the camera moved is the reference's word, where there is one: an estimate may have another scale.
+    let reference = evaluation.streams.iter().position(|s| s.role == Role::Reference);
+    let path_m = reference.map(|stream| spread::path_m(&poses[stream], &cameras));
+
     let total = evaluation.depths.len() * (1 + evaluation.streams.len());
     let mut done = 0;
     let mut pixel = Vec::new();
+    let mut suspicions: Suspicions = evaluation.dataset.suspicions().into_iter().collect();
     for source in evaluation.depths {
         let depths = keyframe_depths(evaluation, *source, &cameras, &poses[evaluation.anchor])?;
         done += 1;
@@ -213,16 +222,26 @@ fn run(
                 Some(sink) => Some(&mut |samples| sink(&stream.name, source.name(), samples)),
                 None => None,
             };
-            let scored = score::score(evaluation, &cameras, poses, &depths, to_sink)
+            let scored = score::score(evaluation, &cameras, poses, &depths, true, to_sink)
                 .map_err(EvaluateError::Samples)?;
             let rmse_px = subset_rmse_px(&scored.errors, &sizes);
+            let moved_m = path_m.as_ref().map_or_else(|| spread::path_m(poses, &cameras), Clone::clone);
+            let spread = spread::spread(evaluation, &scored, &moved_m);
+            let samples = scored.errors.iter().map(|e| e.count).sum();
+            let about = format!("{}, {} depth", stream.name, source.name());
+            suspicions.extend(spread::suspicions(&about, &spread, samples));
             pixel.push(PixelPart {
                 stream: stream.name.clone(),
                 role: stream.role,
                 depth: source.name().to_string(),
                 rmse_px,
                 pooled_rmse_px: pooled_rmse_px(&scored.errors),
-                scored: scored.errors.iter().map(|e| e.count).sum(),
+                held_rmse_px: spread.held_rmse_px,
+                interval_95: spread.interval_95,
+                held: spread.held,
+                by_age: spread.by_age,
+                by_distance: spread.by_distance,
+                scored: samples,
                 skipped: scored.skipped,
                 keyframes: scored.keyframes,
                 samples: scored.samples,
@@ -246,7 +265,7 @@ fn run(
         pixel,
         trajectory,
         paths,
-        suspicions: evaluation.dataset.suspicions().into_iter().collect(),
+        suspicions,
     })
 }
 

@@ -73,7 +73,7 @@ impl<'a> Trial<'a> {
         depths: &TrialDepths,
     ) -> Vec<Sample> {
         // Only a sink can fail, and there is none.
-        score(&self.with(camera), cameras, poses, &depths.0, None)
+        score(&self.with(camera), cameras, poses, &depths.0, false, None)
             .map_or_else(|_| Vec::new(), |all| all.samples)
     }
 
