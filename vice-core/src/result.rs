@@ -298,7 +298,8 @@ impl PixelPart {
             return 100.0;
         }
         let skipped = self.skipped_for(|reason| {
-            let wanted = [crate::evaluate::OCCLUDED, crate::evaluate::NOT_MANUAL];
+            let wanted =
+                [crate::evaluate::OCCLUDED, crate::evaluate::NOT_MANUAL, crate::evaluate::UNCERTAIN];
             !(wanted.contains(&reason) || self.role == Role::Estimate && carried_away(reason))
         });
         100.0 * skipped / (skipped + self.scored as f64)

@@ -22,7 +22,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 pub use select::{Observations, SelectedKeyframe, Selection, Window};
-pub use skip::{BEHIND_CAMERA, NOT_MANUAL, OCCLUDED, OUTSIDE_MODEL, SkipReason};
+pub use skip::{BEHIND_CAMERA, NOT_MANUAL, OCCLUDED, OUTSIDE_MODEL, SkipReason, UNCERTAIN};
 pub use streams::Stream;
 
 use crate::camera::{Camera, Pixel};
@@ -87,6 +87,9 @@ pub enum EvaluateError {
     /// No key frame is manual.
     #[error("no key frame is manual, so that no manual label can be scored by itself (see --observations)")]
     NoManualKeyframe,
+    /// Every key frame is flagged as uncertain.
+    #[error("every key frame is flagged as uncertain, so that no label can be scored (see --observations)")]
+    NoCertainKeyframe,
     /// More points are asked for than there are.
     #[error("subsets of {asked} points were asked for, but there are {points} points")]
     SubsetTooLarge {

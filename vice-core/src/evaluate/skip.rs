@@ -10,6 +10,9 @@ pub const OCCLUDED: &str = "occluded";
 /// The reason of labels that a machine made where only manual ones were asked for: not counted against the run either.
 pub const NOT_MANUAL: &str = "not-manual";
 
+/// The reason of labels whose maker is not sure of them: not counted against the run either.
+pub const UNCERTAIN: &str = "uncertain";
+
 /// The reason of a label whose point was carried behind the camera.
 pub const BEHIND_CAMERA: &str = "behind-camera";
 
@@ -32,6 +35,10 @@ pub enum SkipReason {
     NotManual,
     /// A machine made its key frame, and only manual labels were asked for.
     KeyframeNotManual,
+    /// Whoever made it is not sure, and only certain labels were asked for.
+    Uncertain,
+    /// Whoever made its key frame is not sure, and only certain labels were asked for.
+    KeyframeUncertain,
     /// The stream has no pose at its key frame.
     KeyframeGap,
     /// Its frame lies in too wide a gap of the stream.
@@ -60,6 +67,8 @@ impl SkipReason {
             Self::Occluded => OCCLUDED,
             Self::NotManual => NOT_MANUAL,
             Self::KeyframeNotManual => "keyframe-not-manual",
+            Self::Uncertain => UNCERTAIN,
+            Self::KeyframeUncertain => "keyframe-uncertain",
             Self::KeyframeGap => "keyframe-gap",
             Self::FrameGap => "frame-gap",
             Self::BeforeStream => "before-stream",
