@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use vice_core::camera::{Camera, Model, Pixel};
-use vice_core::dataset::{Dataset, Image};
+use vice_core::dataset::{Dataset, Floor, Image};
 use vice_core::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
 use vice_core::diagnose::{DiagnoseError, Diagnosed, Diagnosis, Flaw, InertialRun, Options, Theta, diagnose};
 use vice_core::error::{DataError, DataResult};
@@ -19,7 +19,7 @@ use vice_core::frames::{BodyFromCamera, Rigid, WorldFromCamera};
 use vice_core::imu::{GRAVITY_Z_UP_M_S2, ImuSample, InertialState};
 use vice_core::label::{LabelRow, LabelSet, Observation};
 use vice_core::metrics::align::Alignment;
-use vice_core::result::{Role, Settings};
+use vice_core::result::Role;
 use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
 use vice_synthetic::Flight;
@@ -151,11 +151,7 @@ impl Flawed {
     pub fn diagnose(&self, with_reference: bool) -> Result<Diagnosed, DiagnoseError> {
         let selection = Selection::new(&self.labels, &self.frames, &self.camera, &Window::default())
             .expect("labels at frames");
-        let stream = |name: &str, role, trajectory: &Trajectory| Stream {
-            name: name.to_string(),
-            role,
-            trajectory: trajectory.clone(),
-        };
+        let stream = |name: &str, role, trajectory: &Trajectory| Stream::new(name, role, trajectory.clone());
         let mut streams = vec![stream("estimate", Role::Estimate, &self.estimate)];
         if with_reference {
             streams.insert(0, stream("reference", Role::Reference, &self.room.reference));
@@ -166,18 +162,15 @@ impl Flawed {
             dataset: self,
             camera_name: CAMERA,
             camera: &self.camera,
-            body_from_camera: None,
             frames: &self.frames,
             selection: &selection,
             streams: &streams,
             anchor: 0,
             depths: &[source],
-            floor: None,
             max_gap: Span::from_millis(100),
             subsets: None,
             align: Alignment::Se3,
             keep_samples: false,
-            settings: Settings::default(),
         };
         let diagnosis = Diagnosis {
             evaluation: &evaluation,
@@ -358,6 +351,10 @@ impl DepthSource for Room {
         "room"
     }
 
+    fn needs_world(&self, _: &Floor) -> bool {
+        true
+    }
+
     fn depths(
         &self,
         keyframe: &Keyframe<'_>,
@@ -374,6 +371,10 @@ struct DepthCamera<'a>(&'a Room);
 impl DepthSource for DepthCamera<'_> {
     fn name(&self) -> &str {
         "depth-camera"
+    }
+
+    fn needs_world(&self, _: &Floor) -> bool {
+        false
     }
 
     fn depths(

@@ -1,13 +1,18 @@
 //! What is labelled: one camera of one data set, the frames that were chosen, and the labels.
 
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use vice_core::camera::Camera;
 use vice_core::dataset::Dataset;
 use vice_core::time::Stamp;
+use vice_run::error::RunResult;
+use vice_run::request::Request;
+use vice_run::sources::DepthName;
 
 use crate::estimates::Estimates;
-use crate::store::{Checks, Store, lock};
+use crate::scene::SceneEstimates;
+use crate::store::{Checks, Store, Target, lock};
 
 /// A camera with its labels, shared by the server and the jobs.
 pub struct Desk {
@@ -28,6 +33,42 @@ pub struct Desk {
 }
 
 impl Desk {
+    /// Opens the recording of a request and its labels, made with the first point where they are not there yet; with what
+    /// its pose streams and depth source add.
+    ///
+    /// # Errors
+    /// [`vice_run::error::RunError`] if something that is asked for is not there, or the labels are of another recording.
+    pub fn open(request: &Request) -> RunResult<Self> {
+        request.protocol.check()?;
+        // Suggestions look at whatever knows the scene, besides the source that dots take their depth from.
+        request.depth.check(&[DepthName::ZCam, DepthName::ZMap])?;
+        let opened = request.dataset.open()?;
+        let chosen = request.protocol.frames(&opened)?;
+        let target =
+            Target { dataset: opened.dataset.name(), camera: &opened.camera_name, frames: &opened.frames };
+        let store = Store::open(&request.labels.file, &target)?;
+        let estimates = SceneEstimates::open(request, &opened, &chosen)?;
+        Ok(Self {
+            dataset: opened.dataset,
+            camera_name: opened.camera_name,
+            camera: opened.camera,
+            frames: opened.frames,
+            chosen,
+            store: Arc::new(Mutex::new(store)),
+            estimates: estimates.map(|e| Arc::new(e) as Arc<dyn Estimates>),
+        })
+    }
+
+    /// Why the labels cannot be changed, where they cannot.
+    pub fn read_only(&self) -> Option<String> {
+        self.store().read_only().map(ToString::to_string)
+    }
+
+    /// The file of the labels.
+    pub fn labels_file(&self) -> PathBuf {
+        self.store().path().to_path_buf()
+    }
+
     /// What edits are checked against.
     pub fn checks(&self) -> Checks<'_> {
         Checks { camera: &self.camera, frames: &self.frames }

@@ -16,6 +16,7 @@ pub mod desk;
 pub mod estimates;
 pub mod exchange;
 pub mod jobs;
+mod scene;
 pub mod server;
 pub mod store;
 pub mod suggest;

@@ -1,73 +1,20 @@
-//! From options to what the pipeline takes. Shared by all commands that evaluate.
+//! Options as clap sees them, and the parts of a request that they become. Shared by all commands.
 
+mod dataset;
 mod depth;
-mod estimates;
 mod evaluation;
-mod open;
-mod outputs;
 mod streams;
 
-pub(crate) use depth::{AnchorArgs, DepthArgs, Scene};
-pub(crate) use estimates::SceneEstimates;
-pub(crate) use evaluation::{EvaluationArgs, Scoring};
-pub(crate) use open::{DatasetArgs, setting, split_list};
-pub(crate) use outputs::Outputs;
-pub(crate) use streams::{LoadedStreams, StreamArgs, load_streams};
-
-use std::path::PathBuf;
+use std::path::Path;
 
 use anyhow::Context;
-use vice_core::evaluate::{Observations, Window};
-use vice_core::time::Span;
+use vice_run::core::time::Span;
+use vice_run::files::atomic::{self, Overwrite};
 
-/// Labels and the part of the run that is evaluated.
-#[derive(Debug, clap::Args)]
-#[command(next_help_heading = "Labels")]
-pub(crate) struct LabelArgs {
-    /// Labels: CSV, JSON, or the authors' pickle.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) labels: PathBuf,
-    /// Only these points.
-    #[arg(long, value_name = "NAME,...")]
-    pub(crate) points: Vec<String>,
-    /// Whose labels count: all, or only those that a human placed.
-    #[arg(long, value_name = "manual|all", default_value = "all")]
-    pub(crate) observations: Observations,
-    /// Keep the frame nearest to each tick of this rate, and every key frame [default: every labelled frame].
-    #[arg(long, value_name = "HZ", value_parser = positive)]
-    pub(crate) fps: Option<f64>,
-    /// Seconds after the camera's first frame.
-    #[arg(long, value_name = "S", default_value = "0", allow_hyphen_values = true, value_parser = span_not_negative)]
-    pub(crate) start: Span,
-    /// Seconds from there [default: to the end].
-    #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = span_not_negative)]
-    pub(crate) duration: Option<Span>,
-}
-
-impl LabelArgs {
-    pub(crate) fn window(&self) -> Window {
-        Window { fps: self.fps, start: self.start, duration: self.duration, observations: self.observations }
-    }
-
-    /// The labels, or those of the chosen points.
-    pub(crate) fn read(
-        &self,
-        frames: &[vice_core::time::Stamp],
-    ) -> anyhow::Result<vice_core::label::LabelSet> {
-        let labels = vice_files::labels::read(&self.labels, Some(frames))?;
-        let wanted = split_list(&self.points);
-        if wanted.is_empty() {
-            return Ok(labels);
-        }
-        labels.select(&wanted).map_err(|unknown| {
-            let names: Vec<&str> = labels.points().iter().map(|p| p.name.as_str()).collect();
-            crate::terminal::usage(format!(
-                "--points: there is no point {unknown}; there are {}",
-                names.join(", ")
-            ))
-        })
-    }
-}
+pub(crate) use dataset::{DatasetArgs, PluginArgs, setting};
+pub(crate) use depth::{AnchorArgs, DepthArgs, SourceArgs};
+pub(crate) use evaluation::{EvaluationArgs, LabelArgs, WindowArgs};
+pub(crate) use streams::StreamArgs;
 
 /// A span in decimal seconds.
 pub(crate) fn span(text: &str) -> Result<Span, String> {
@@ -102,6 +49,21 @@ pub(crate) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     values.try_into().map_err(|_| format!("{N} numbers separated by commas are expected, got {got}"))
 }
 
+/// Lists repeat the option or take commas; a value that is a file keeps its commas.
+pub(crate) fn split_list(values: &[String]) -> Vec<String> {
+    let mut list: Vec<String> = Vec::new();
+    for value in values {
+        let whole = Path::new(value).exists();
+        let parts: Vec<&str> = if whole { vec![value.as_str()] } else { value.split(',').collect() };
+        for part in parts.into_iter().map(str::trim).filter(|p| !p.is_empty()) {
+            if !list.iter().any(|p| p == part) {
+                list.push(part.to_string());
+            }
+        }
+    }
+    list
+}
+
 /// A document as one line of JSON.
 pub(crate) fn to_json(document: &impl serde::Serialize) -> anyhow::Result<String> {
     let mut text = serde_json::to_string(document).context("cannot make the JSON")?;
@@ -110,9 +72,19 @@ pub(crate) fn to_json(document: &impl serde::Serialize) -> anyhow::Result<String
 }
 
 /// Writes a document beside and renames it.
-pub(crate) fn write_text(path: &std::path::Path, text: &str) -> anyhow::Result<()> {
-    vice_files::atomic::write(path, vice_files::atomic::Overwrite::Replace, |out| {
-        out.write_all(text.as_bytes())
-    })
-    .with_context(|| format!("cannot write {}", path.display()))
+pub(crate) fn write_text(path: &Path, text: &str) -> anyhow::Result<()> {
+    atomic::write(path, Overwrite::Replace, |out| out.write_all(text.as_bytes()))
+        .with_context(|| format!("cannot write {}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_repeat_or_take_commas() {
+        let list = |values: &[&str]| split_list(&values.iter().map(|v| (*v).to_string()).collect::<Vec<_>>());
+        assert_eq!(list(&["floor,zmap", "zcam", "floor"]), ["floor", "zmap", "zcam"]);
+        assert_eq!(list(&["a, b,,"]), ["a", "b"]);
+    }
 }

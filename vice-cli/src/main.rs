@@ -3,9 +3,8 @@
 
 mod arguments;
 mod commands;
-mod formats;
 mod inputs;
-mod report;
+mod outputs;
 mod terminal;
 
 use std::process::ExitCode;
@@ -13,7 +12,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use arguments::{Cli, Command};
-use terminal::{Outcome, UsageError};
+use terminal::Outcome;
 
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
@@ -49,7 +48,7 @@ fn main() -> ExitCode {
         Err(error) if terminal::is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             terminal::print_error(&error);
-            ExitCode::from(if error.is::<UsageError>() { 2 } else { 1 })
+            ExitCode::from(terminal::exit_code(&error))
         }
     }
 }

@@ -8,7 +8,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use tracing_subscriber::fmt::format::Writer;
 use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields};
 use tracing_subscriber::registry::LookupSpan;
-use vice_core::error::one_line;
+use vice_run::core::error::{DataError, ErrorKind};
+use vice_run::core::suspicion::Suspicion;
+use vice_run::error::RunError;
+pub(crate) use vice_run::text::printable;
 
 /// How a command ended that did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +52,7 @@ impl Verbosity {
     }
 
     /// A bar for long work, drawn only on a terminal.
-    pub(crate) fn progress(self, what: &'static str) -> ProgressBar {
+    fn progress(self, what: &'static str) -> ProgressBar {
         if self.quiet || !std::io::stderr().is_terminal() {
             return ProgressBar::hidden();
         }
@@ -66,10 +69,20 @@ impl Verbosity {
     }
 }
 
-/// Moves a bar to where the work is; how much there is may only be known by then.
-pub(crate) fn advance(bar: &ProgressBar, done: usize, total: usize) {
-    bar.set_length(total as u64);
-    bar.set_position(done as u64);
+/// Runs work under a bar that shows what it is at.
+pub(crate) fn with_progress<T>(
+    verbosity: Verbosity,
+    work: impl FnOnce(&(dyn Fn(&'static str, usize, usize) + Sync)) -> T,
+) -> T {
+    let bar = verbosity.progress("");
+    let result = work(&|what, done, total| {
+        // How much there is may only be known by then.
+        bar.set_message(what);
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+    });
+    bar.finish_and_clear();
+    result
 }
 
 /// Sends warnings of the libraries to standard error.
@@ -139,16 +152,112 @@ pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
 
 /// Prints an error and its causes on one line.
 pub(crate) fn print_error(error: &anyhow::Error) {
-    let _ = writeln!(std::io::stderr(), "error: {}", printable(&one_line(error.as_ref())));
+    let _ = writeln!(std::io::stderr(), "error: {}", printable(&told(error)));
 }
 
-/// Text from data made safe for a terminal: control characters would move its cursor or change its colours, and those
-/// that turn the direction of writing would show a name as another one.
-pub(crate) fn printable(text: &str) -> String {
-    let turns =
-        |c: char| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    let breaks = |c: char| matches!(c, '\u{2028}' | '\u{2029}');
-    text.chars().map(|c| if c.is_control() || turns(c) || breaks(c) { ' ' } else { c }).collect()
+/// Says what looks wrong in the data, a line each.
+pub(crate) fn warn<'a>(suspicions: impl IntoIterator<Item = &'a Suspicion>) {
+    for suspicion in suspicions {
+        tracing::warn!("{}", with_options(&suspicion.line()));
+    }
+}
+
+/// An error and its causes on one line, each said once, with fields of a request as options.
+pub(crate) fn told(error: &anyhow::Error) -> String {
+    let mut line = String::new();
+    for cause in error.chain() {
+        let text = one(cause);
+        // Transparent wrappers repeat what they wrap.
+        if !line.ends_with(&text) {
+            line = if line.is_empty() { text } else { format!("{line}: {text}") };
+        }
+    }
+    line
+}
+
+/// One error by itself. Only what this program's libraries say has names of fields in it, never what comes from data.
+fn one(error: &(dyn std::error::Error + 'static)) -> String {
+    if let Some(error) = error.downcast_ref::<RunError>() {
+        let field = error.field().map_or_else(String::new, |field| format!("--{field}: "));
+        let own = error.problem();
+        let problem = match std::error::Error::source(error) {
+            Some(cause) if own.is_empty() => one(cause),
+            _ => own.to_string(),
+        };
+        let hint = error.hint().map_or_else(String::new, |hint| format!(" ({})", with_options(hint)));
+        return format!("{field}{problem}{hint}");
+    }
+    match error.downcast_ref::<DataError>() {
+        // The hint ends the text of an error of data.
+        Some(data) => match data.hint_text() {
+            Some(hint) => {
+                let text = data.to_string();
+                let before = text.strip_suffix(&format!("({hint})")).unwrap_or(&text);
+                format!("{before}({})", with_options(hint))
+            }
+            None => data.to_string(),
+        },
+        None => error.to_string(),
+    }
+}
+
+/// Names of fields in back quotes as options: `max-gap` as --max-gap.
+pub(crate) fn with_options(hint: &str) -> String {
+    let mut text = String::new();
+    for (index, part) in hint.split('`').enumerate() {
+        let is_field = index % 2 == 1 && FIELDS.contains(&part);
+        match (index % 2, is_field) {
+            (1, true) => text.push_str(&format!("--{part}")),
+            (1, false) => text.push_str(&format!("`{part}`")),
+            _ => text.push_str(part),
+        }
+    }
+    text
+}
+
+/// Fields that have an option of the same name.
+const FIELDS: [&str; 31] = [
+    "add",
+    "align",
+    "allow-writable-plugin",
+    "anchor",
+    "at",
+    "calibration",
+    "camera",
+    "chessboard",
+    "cloud-voxel",
+    "depth",
+    "duration",
+    "estimate",
+    "estimate-as",
+    "estimate-frame",
+    "floor-plane",
+    "force",
+    "format",
+    "initial-pose",
+    "interpolate",
+    "labels",
+    "max-gap",
+    "observations",
+    "plugin",
+    "points",
+    "port",
+    "reference",
+    "set",
+    "start",
+    "tag-size",
+    "time-offset",
+    "zmap-occlusion",
+];
+
+/// The exit code of an error: 2 where the request makes no sense, else 1.
+pub(crate) fn exit_code(error: &anyhow::Error) -> u8 {
+    let usage = error.chain().any(|cause| {
+        cause.is::<UsageError>()
+            || cause.downcast_ref::<RunError>().is_some_and(|e| e.kind() == ErrorKind::Usage)
+            || cause.downcast_ref::<DataError>().is_some_and(|e| e.kind() == ErrorKind::Usage)
+    });
+    if usage { 2 } else { 1 }
 }
 
 /// Whether the reader of standard output went away, as `head` does: no failure of ours.
@@ -175,10 +284,20 @@ mod tests {
     fn an_error_is_one_line_and_says_each_cause_once() {
         let io = std::io::Error::other("disk on\nfire");
         let error = Err::<(), _>(io).context("cannot write x").unwrap_err();
-        assert_eq!(printable(&one_line(error.as_ref())), "cannot write x: disk on fire");
+        assert_eq!(printable(&told(&error)), "cannot write x: disk on fire");
         let twice = anyhow::anyhow!("same").context("same");
-        assert_eq!(one_line(twice.as_ref()), "same");
-        assert_eq!(printable("a\u{1b}[31mb"), "a [31mb");
-        assert_eq!(printable("gpj.\u{202e}txt\u{2028}"), "gpj. txt ");
+        assert_eq!(told(&twice), "same");
+    }
+
+    #[test]
+    fn fields_of_a_request_are_options_and_exit_codes_follow_from_the_kind() {
+        let wrong = RunError::usage("anchor", "there is no `reference`").advise("give `reference`, not `x`");
+        let error = anyhow::Error::new(wrong);
+        assert_eq!(told(&error), "--anchor: there is no `reference` (give --reference, not `x`)");
+        assert_eq!(exit_code(&error), 2);
+        let data = DataError::of_kind(ErrorKind::Missing, "no such `labels`").at("a").hint("see `labels`");
+        let error = anyhow::Error::new(RunError::from(data)).context("first");
+        assert_eq!(told(&error), "first: a: no such `labels` (see --labels)");
+        assert_eq!(exit_code(&error), 1);
     }
 }

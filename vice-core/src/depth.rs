@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::camera::{Camera, Pixel};
-use crate::dataset::Floor;
+use crate::dataset::{Dataset, Floor};
 use crate::error::DataResult;
-use crate::frames::{BodyFromCamera, WorldFromCamera};
+use crate::frames::{BodyFromCamera, WorldFromBody, WorldFromCamera};
 use crate::time::Stamp;
 
 /// A key frame as a depth source sees it.
@@ -23,6 +23,29 @@ pub struct Keyframe<'a> {
     pub world_from_camera: Option<WorldFromCamera>,
     /// The floor as it is known at that stamp.
     pub floor: Floor,
+}
+
+impl<'a> Keyframe<'a> {
+    /// A frame of a data set's camera, with the body's pose in the world by the anchor, where it has one.
+    ///
+    /// # Errors
+    /// [`crate::error::DataError`] if the camera's place in the body or the floor is unknown at that stamp.
+    pub fn at(
+        dataset: &dyn Dataset,
+        (name, camera): (&str, &'a Camera),
+        (frame, stamp): (usize, Stamp),
+        world_from_body: Option<WorldFromBody>,
+    ) -> DataResult<Self> {
+        let body_from_camera = dataset.body_from_camera(name, stamp)?;
+        Ok(Self {
+            stamp,
+            frame,
+            camera,
+            body_from_camera,
+            world_from_camera: world_from_body.map(|pose| pose * body_from_camera),
+            floor: dataset.floor(stamp)?,
+        })
+    }
 }
 
 /// A depth.
@@ -102,6 +125,15 @@ pub trait DepthSource: Send + Sync {
         keyframe: &Keyframe<'_>,
         pixels: &[Pixel],
     ) -> DataResult<Vec<Result<DepthSample, DepthMiss>>>;
+
+    /// Whether the source asks where the camera is in the world, with the floor as it is known: then the anchor must be
+    /// in the world of that floor or cloud.
+    fn needs_world(&self, floor: &Floor) -> bool;
+
+    /// Whether the source decodes images or depth images of the data set.
+    fn needs_images(&self) -> bool {
+        false
+    }
 
     /// Share of a depth by which the answers at neighbouring pixels differ by noise alone, one standard deviation: that
     /// of a scanned cloud. Zero where the surface is smooth, or where depth does not depend on the camera's place.

@@ -107,6 +107,11 @@ impl DataError {
         &self.problem
     }
 
+    /// What the user can do, where something is known; names of a request's fields stand in back quotes.
+    pub fn hint_text(&self) -> Option<&str> {
+        self.hint.as_deref()
+    }
+
     /// The file or folder, where known.
     pub fn path(&self) -> Option<&Path> {
         self.path.as_deref()

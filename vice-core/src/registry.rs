@@ -58,12 +58,12 @@ impl Registry {
             1 => Ok(claims.remove(0)),
             0 => Err(DataError::new("no format recognises this")
                 .at(path)
-                .hint(format!("known: {}; force one with --format", self.names()))),
+                .hint(format!("known: {}; force one with `format`", self.names()))),
             _ => {
                 let names: Vec<String> = claims.iter().map(|(f, _)| f.info().name).collect();
                 Err(DataError::new(format!("more than one format recognises this: {}", names.join(", ")))
                     .at(path)
-                    .hint("choose with --format"))
+                    .hint("choose with `format`"))
             }
         }
     }

@@ -1,4 +1,4 @@
-//! The result document `vice.result/1`: what an evaluation found, and all that is needed to repeat and to plot it.
+//! What an evaluation found, and all that is needed to plot it. Result documents hold it beside what was asked for.
 //!
 //! Units stand in the names. A number that could not be had is null, never NaN.
 
@@ -13,24 +13,15 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::camera::Pixel;
 use crate::metrics::pixel::SubsetRmse;
+use crate::skip::SkipReason;
 use crate::suspicion::Suspicions;
 use crate::time::Stamp;
 
-/// The schema's name and version.
-pub const SCHEMA: &str = "vice.result/1";
-
-/// The document.
+/// What an evaluation found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ResultDocument {
-    /// [`SCHEMA`].
-    pub schema: String,
-    /// Version of VICE that wrote it.
-    #[serde(default)]
-    pub vice_version: String,
+pub struct Evaluated {
     /// What was evaluated.
     pub dataset: DatasetPart,
-    /// How it was evaluated.
-    pub settings: Settings,
     /// Pixel errors, one entry for each pose stream and depth source.
     pub pixel: Vec<PixelPart>,
     /// Estimates against the reference, where there is one.
@@ -58,43 +49,6 @@ pub struct DatasetPart {
     /// Its first frame, which plots count seconds from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first_frame_ns: Option<Stamp>,
-}
-
-/// How it was evaluated, as given or as chosen by default.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Settings {
-    /// Path of the data set, as given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub dataset: Option<String>,
-    /// File of the labels.
-    pub labels: String,
-    /// Names of the points that take part.
-    pub points: Vec<String>,
-    /// Frames a second, null where every labelled frame counts.
-    pub fps: Option<f64>,
-    /// Seconds after the camera's first frame.
-    pub start_s: f64,
-    /// Seconds, null to the end.
-    pub duration_s: Option<f64>,
-    /// Widest gap between two poses that is interpolated, seconds.
-    pub max_gap_s: f64,
-    /// Seconds added to the estimates' stamps.
-    pub time_offset_s: f64,
-    /// Alignment of the trajectory errors.
-    pub align: String,
-    /// The pose stream that places the camera for depth.
-    pub anchor: String,
-    /// Calibration file that overrides the data set's, where there is one.
-    pub calibration: Option<String>,
-    /// The floor plane `n·p + d = 0` in the world that overrides the data set's: nx, ny, nz, d.
-    pub floor_plane: Option<[f64; 4]>,
-    /// Whether the Z-map tests occlusion.
-    pub zmap_occlusion: bool,
-    /// Whose poses the estimates are.
-    pub estimate_frame: String,
-    /// What else was set, by option.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub other: BTreeMap<String, String>,
 }
 
 /// Whether a stream is what is evaluated or what it is compared with.
@@ -152,8 +106,8 @@ pub struct Skip {
     pub point: PointName,
     /// The frame.
     pub timestamp_ns: Stamp,
-    /// Why: see [`crate::evaluate::SkipReason`].
-    pub reason: String,
+    /// Why.
+    pub reason: SkipReason,
 }
 
 /// A key frame and the depth that lifted its pixel.
@@ -269,7 +223,7 @@ pub struct PathPose {
     pub rotation_wxyz: [f64; 4],
 }
 
-impl ResultDocument {
+impl Evaluated {
     /// Leaves out the scored samples and what only plots need, as if they had not been asked for.
     pub fn drop_samples(&mut self) {
         self.paths.clear();
@@ -283,11 +237,6 @@ impl ResultDocument {
     }
 }
 
-/// Whether this is the reason of a label whose point a stream carried out of the camera's reach.
-fn carried_away(reason: &str) -> bool {
-    [crate::evaluate::BEHIND_CAMERA, crate::evaluate::OUTSIDE_MODEL].contains(&reason)
-}
-
 impl PixelPart {
     /// Share of labels that could not be scored, in percent. Where nothing was scored it is 100, whatever the reason.
     ///
@@ -298,9 +247,7 @@ impl PixelPart {
             return 100.0;
         }
         let skipped = self.skipped_for(|reason| {
-            let wanted =
-                [crate::evaluate::OCCLUDED, crate::evaluate::NOT_MANUAL, crate::evaluate::UNCERTAIN];
-            !(wanted.contains(&reason) || self.role == Role::Estimate && carried_away(reason))
+            !(reason.is_wanted() || self.role == Role::Estimate && reason.is_carried_away())
         });
         100.0 * skipped / (skipped + self.scored as f64)
     }
@@ -308,19 +255,19 @@ impl PixelPart {
     /// Share of labels, in percent of these and the scored ones, whose point the stream carried behind the camera or out
     /// of its model's reach: no pixel can be compared there, and the RMSE is over the rest.
     pub fn carried_away_percent(&self) -> f64 {
-        let away = self.skipped_for(carried_away);
+        let away = self.skipped_for(SkipReason::is_carried_away);
         if away == 0.0 { 0.0 } else { 100.0 * away / (away + self.scored as f64) }
     }
 
-    fn skipped_for(&self, counts: impl Fn(&str) -> bool) -> f64 {
-        self.skipped.iter().filter(|s| counts(&s.reason)).count() as f64
+    fn skipped_for(&self, counts: impl Fn(SkipReason) -> bool) -> f64 {
+        self.skipped.iter().filter(|s| counts(s.reason)).count() as f64
     }
 
     /// Number of skipped labels by reason, sorted by reason.
-    pub fn skips_by_reason(&self) -> BTreeMap<&str, usize> {
+    pub fn skips_by_reason(&self) -> BTreeMap<&'static str, usize> {
         let mut counts = BTreeMap::new();
         for skip in &self.skipped {
-            *counts.entry(skip.reason.as_str()).or_insert(0) += 1;
+            *counts.entry(skip.reason.name()).or_insert(0) += 1;
         }
         counts
     }

@@ -60,6 +60,10 @@ impl DepthSource for FloorDepth {
         "floor"
     }
 
+    fn needs_world(&self, floor: &Floor) -> bool {
+        matches!(floor, Floor::World(_))
+    }
+
     fn depths(
         &self,
         keyframe: &Keyframe<'_>,

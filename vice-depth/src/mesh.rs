@@ -14,6 +14,7 @@ use parry3d::query::{Ray, RayCast};
 use parry3d::shape::TriMesh;
 use rayon::prelude::*;
 use vice_core::camera::Pixel;
+use vice_core::dataset::Floor;
 use vice_core::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
 use vice_core::error::{DataError, DataResult};
 use vice_core::frames::{Cloud as CloudFrame, Rigid, World};
@@ -131,6 +132,10 @@ impl MeshDepth {
 impl DepthSource for MeshDepth {
     fn name(&self) -> &str {
         "mesh"
+    }
+
+    fn needs_world(&self, _: &Floor) -> bool {
+        true
     }
 
     fn depths(

@@ -6,7 +6,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use vice_core::camera::Pixel;
-use vice_core::dataset::{Dataset, DepthImage};
+use vice_core::dataset::{Dataset, DepthImage, Floor};
 use vice_core::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
 use vice_core::error::{DataError, DataResult};
 
@@ -75,6 +75,14 @@ impl ZCamDepth {
 impl DepthSource for ZCamDepth {
     fn name(&self) -> &str {
         "zcam"
+    }
+
+    fn needs_world(&self, _: &Floor) -> bool {
+        false
+    }
+
+    fn needs_images(&self) -> bool {
+        true
     }
 
     fn depths(

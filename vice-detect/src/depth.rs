@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
 use vice_core::camera::{Camera, Pixel};
-use vice_core::dataset::Dataset;
+use vice_core::dataset::{Dataset, Floor};
 use vice_core::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
 use vice_core::error::{DataError, DataResult};
 
@@ -45,6 +45,14 @@ impl TagDepth {
 impl DepthSource for TagDepth {
     fn name(&self) -> &str {
         "tag"
+    }
+
+    fn needs_world(&self, _: &Floor) -> bool {
+        false
+    }
+
+    fn needs_images(&self) -> bool {
+        true
     }
 
     fn depths(

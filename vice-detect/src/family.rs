@@ -2,17 +2,23 @@
 
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use crate::codes;
 
 /// A family of AprilTags.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum TagFamily {
     /// 36 cells, 587 tags, codes at least 11 cells apart.
+    #[default]
+    #[serde(rename = "36h11")]
     T36h11,
     /// 25 cells, 35 tags, codes at least 9 cells apart.
+    #[serde(rename = "25h9")]
     T25h9,
     /// 16 cells, 30 tags, codes at least 5 cells apart.
+    #[serde(rename = "16h5")]
     T16h5,
 }
 

@@ -74,7 +74,7 @@ where
 }
 
 fn exists(path: &Path) -> DataError {
-    DataError::new("exists already").at(path).hint("--force replaces it")
+    DataError::new("exists already").at(path).hint("`force` replaces it")
 }
 
 fn new_file_beside(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
@@ -104,7 +104,7 @@ pub fn prepare_folder(path: impl AsRef<Path>, force: bool) -> DataResult<()> {
         if holds_something && !force {
             return Err(DataError::new("the folder is not empty")
                 .at(path)
-                .hint("--force writes into it and replaces files of the same name"));
+                .hint("`force` writes into it and replaces files of the same name"));
         }
         return Ok(());
     }
@@ -121,7 +121,7 @@ mod tests {
         let path = folder.path().join("labels.csv");
         write(&path, Overwrite::Refuse, |w| w.write_all(b"one")).unwrap();
         let error = write(&path, Overwrite::Refuse, |w| w.write_all(b"two")).unwrap_err();
-        assert!(error.to_string().contains("--force"), "{error}");
+        assert!(error.to_string().contains("`force`"), "{error}");
         let full = write(&path, Overwrite::Replace, |w| {
             w.write_all(&[b'x'; 1 << 17])?;
             Err(io::Error::from(io::ErrorKind::StorageFull))
@@ -171,7 +171,7 @@ mod tests {
         prepare_folder(&fresh, false).unwrap();
         fs::write(fresh.join("file"), b"").unwrap();
         let error = prepare_folder(&fresh, false).unwrap_err().to_string();
-        assert!(error.contains("not empty") && error.contains("--force"), "{error}");
+        assert!(error.contains("not empty") && error.contains("`force`"), "{error}");
         prepare_folder(&fresh, true).unwrap();
         assert!(prepare_folder(fresh.join("file"), true).unwrap_err().to_string().contains("is a file"));
     }

@@ -79,7 +79,7 @@ impl Plugin {
             Some(reason) if !options.allow_writable => {
                 return Err(DataError::new(format!("not loaded: {reason}"))
                     .at(&place.path)
-                    .hint("loading a plugin runs its code; --allow-writable-plugin loads it all the same"));
+                    .hint("loading a plugin runs its code; `allow-writable-plugin` loads it all the same"));
             }
             Some(reason) => tracing::warn!("{reason}; loaded as --allow-writable-plugin asks"),
             None => {}

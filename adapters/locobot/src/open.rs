@@ -252,7 +252,7 @@ fn frames_of(
     }
     if frames.is_empty() {
         return Err(DataError::new(format!("topic {name}: all {unstamped} stamps are zero")).hint(
-            "a robot on simulated time without a clock; `--set stamps=record` takes the time of recording",
+            "a robot on simulated time without a clock; `set` stamps=record takes the time of recording",
         ));
     }
     if unstamped > 0 {

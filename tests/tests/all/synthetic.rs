@@ -9,7 +9,7 @@ use vice_core::depth::DepthSource;
 use vice_core::evaluate::{Evaluation, Selection, Stream, Window, evaluate};
 use vice_core::label::LabelSet;
 use vice_core::metrics::align::Alignment;
-use vice_core::result::{PixelPart, Role, Settings};
+use vice_core::result::{PixelPart, Role};
 use vice_core::time::Span;
 use vice_depth::{CloudOptions, FloorDepth, ZMapDepth, ZMapOptions, load_cloud};
 use vice_euroc::Euroc;
@@ -29,10 +29,8 @@ fn score(synthetic: &Synthetic, camera: &Camera, labels: &LabelSet, zmap: bool) 
         .into_iter()
         .chain(synthetic.estimates().iter().cloned())
         .enumerate()
-        .map(|(i, (name, trajectory))| Stream {
-            name: name.to_string(),
-            role: if i == 0 { Role::Reference } else { Role::Estimate },
-            trajectory,
+        .map(|(i, (name, trajectory))| {
+            Stream::new(name, if i == 0 { Role::Reference } else { Role::Estimate }, trajectory)
         })
         .collect();
     let source: Box<dyn DepthSource> = if zmap {
@@ -46,18 +44,15 @@ fn score(synthetic: &Synthetic, camera: &Camera, labels: &LabelSet, zmap: bool) 
         dataset: synthetic,
         camera_name: CAMERA,
         camera,
-        body_from_camera: None,
         frames: &frames,
         selection: &selection,
         streams: &streams,
         anchor: 0,
         depths: &[source.as_ref()],
-        floor: None,
         max_gap: Span::from_millis(100),
         subsets: None,
         align: Alignment::Se3,
         keep_samples: false,
-        settings: Settings::default(),
     };
     evaluate(&evaluation, &|_, _| ()).unwrap().pixel
 }

@@ -87,7 +87,7 @@ async fn run(desk: Desk, options: &ServerOptions, ready: impl FnOnce(&str)) -> D
         let error = DataError::new(format!("cannot listen on {wanted}"));
         match e.kind() {
             std::io::ErrorKind::AddrInUse => {
-                error.hint("another program uses this port; --port 0 takes a free one")
+                error.hint("another program uses this port; `port` 0 takes a free one")
             }
             _ => error,
         }

@@ -245,7 +245,7 @@ fn check_belongs(document: &Document, target: &Target<'_>) -> DataResult<()> {
             "these are labels of the camera {camera}, not of {}",
             target.camera
         ))
-        .hint(format!("--camera {camera}")));
+        .hint(format!("choose it with `camera` {camera}")));
     }
     let stamps = || document.points().flat_map(|(_, observations)| observations.keys());
     let all = stamps().count();

@@ -3,23 +3,20 @@
 use std::collections::BTreeMap;
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
 
 use anyhow::Context;
 use vice_annotate::desk::Desk;
-use vice_annotate::estimates::Estimates;
 use vice_annotate::server::{ServerOptions, serve};
-use vice_annotate::store::{Store, Target};
-use vice_core::evaluate::Window;
-use vice_core::time::Span;
+use vice_run::request::{LabelsSpec, Request};
 
-use crate::inputs::{DatasetArgs, DepthArgs, SceneEstimates, StreamArgs, positive, span_not_negative};
+use crate::inputs::{DatasetArgs, DepthArgs, StreamArgs, WindowArgs};
 use crate::terminal::{self, Outcome, Verbosity, usage};
 
 /// Arguments of `vice annotate`.
 #[derive(Debug, clap::Args)]
 #[command(
     mut_arg("estimate", |a| a.required(false)),
+    mut_arg("fps", |a| a.help("Label the frame nearest to each tick of this rate [default: every frame]")),
     after_help = "Examples:\n  \
     vice annotate V1_01_easy --labels floor.json --fps 10 --duration 30\n  \
     vice annotate my_run --labels my.json --estimate openvins.txt --depth zmap --no-open\n\n\
@@ -33,18 +30,11 @@ pub(crate) struct Args {
     /// Labels, made with the first point where they are not there yet.
     #[arg(long, value_name = "FILE", help_heading = "Labels")]
     labels: PathBuf,
-    /// Label the frame nearest to each tick of this rate [default: every frame].
-    #[arg(long, value_name = "HZ", value_parser = positive, help_heading = "Labels")]
-    fps: Option<f64>,
-    /// Seconds after the camera's first frame.
-    #[arg(long, value_name = "S", default_value = "0", allow_hyphen_values = true, value_parser = span_not_negative, help_heading = "Labels")]
-    start: Span,
-    /// Seconds from there [default: to the end].
-    #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = span_not_negative, help_heading = "Labels")]
-    duration: Option<Span>,
+    #[command(flatten)]
+    window: WindowArgs,
     #[command(flatten)]
     streams: StreamArgs,
-    /// Depth source of dots and suggestions: floor, zmap, zcam, mesh [default: floor].
+    /// Depth source of dots and suggestions: floor, zmap, zcam, mesh, tag [default: floor].
     #[arg(long, value_name = "SOURCE", help_heading = "Depth")]
     depth: Option<String>,
     #[command(flatten)]
@@ -73,43 +63,26 @@ struct ServerArgs {
 
 pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
     let keys = keys(args)?;
-    let calibration = args.depth_options.calibration()?;
-    let dataset = args.dataset.open()?;
-    let used = args.dataset.used_camera(dataset.as_ref(), calibration.as_ref())?;
-    let window = Window { fps: args.fps, start: args.start, duration: args.duration, ..Window::default() };
-    let chosen = window.frames(&used.frames);
-    if chosen.is_empty() {
-        return Err(usage(format!(
-            "no frame lies in the part of the run that was asked for; camera {} has {} (see --start, --duration)",
-            used.name,
-            used.frames.len()
-        )));
+    let names: Vec<String> = args.depth.iter().cloned().collect();
+    let depth = args.depth_options.spec("--depth", &names)?;
+    if depth.sources.len() > 1 {
+        return Err(usage("--depth: the annotator takes one depth source"));
     }
-    let frames = Arc::clone(&used.frames);
-    let (camera_name, camera) = (used.name.clone(), used.camera);
-    let target = Target { dataset: dataset.name(), camera: &camera_name, frames: &frames };
-    let store = Store::open(&args.labels, &target)?;
-    if let Some(reason) = store.read_only() {
-        tracing::warn!("{}: {reason}; the labels are shown, but cannot be changed", store.path().display());
-    }
-    let estimates = SceneEstimates::open(
-        &dataset,
-        used,
-        &chosen,
-        args.streams.clone(),
-        args.depth.as_deref(),
-        &args.depth_options,
-        calibration,
-    )?;
-    let desk = Desk {
-        dataset,
-        camera_name,
-        camera,
-        frames,
-        chosen,
-        store: Arc::new(Mutex::new(store)),
-        estimates: estimates.map(|e| Arc::new(e) as Arc<dyn Estimates>),
+    let request = Request {
+        dataset: args.depth_options.dataset(&args.dataset),
+        labels: LabelsSpec { file: args.labels.clone(), ..LabelsSpec::default() },
+        protocol: args.window.spec(),
+        streams: args.streams.spec()?,
+        depth,
+        ..Request::default()
     };
+    let desk = Desk::open(&request)?;
+    if let Some(reason) = desk.read_only() {
+        tracing::warn!(
+            "{}: {reason}; the labels are shown, but cannot be changed",
+            desk.labels_file().display()
+        );
+    }
     if !args.server.bind.is_loopback() {
         tracing::warn!(
             "--bind {}: whoever reaches this address and learns the token can see the images and change the labels, and \

@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::inputs::{Outputs, to_json};
-use crate::report::comparison::{By, Document, NamedRun, csv, latex, text};
-use crate::report::result_file;
+use vice_run::report::comparison::{By, Document, NamedRun, csv, latex, text};
+use vice_run::result;
+
+use crate::inputs::to_json;
+use crate::outputs::Outputs;
 use crate::terminal::{self, Outcome, printable, usage};
 
 /// Arguments of `vice compare`.
@@ -19,7 +21,7 @@ pub(crate) struct Args {
     #[arg(value_name = "RESULT.json", required = true)]
     results: Vec<PathBuf>,
     /// What is compared [default: runs; with one result streams, or depths where there is one stream].
-    #[arg(long, value_name = "WHAT")]
+    #[arg(long, value_name = "runs|streams|depths")]
     by: Option<By>,
     /// Seed of the resampling.
     #[arg(long, value_name = "N", default_value = "1")]
@@ -49,7 +51,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let outputs = Outputs::new(&[&args.json, &args.csv, &args.latex], &args.results)?;
     let mut runs: Vec<NamedRun> = Vec::new();
     for path in &args.results {
-        runs.push((run_name(path, &runs), result_file::read(path)?));
+        runs.push((run_name(path, &runs), result::read(path)?));
     }
     let by = args.by.unwrap_or_else(|| default_by(&runs));
     let document = Document::of(&runs, by, args.seed, &|problem| tracing::warn!("{problem}"));
@@ -82,7 +84,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
 /// The largest rise of all, where it is above the limit.
 fn fail_above(document: &Document, limit_px: Option<f64>) -> anyhow::Result<()> {
     let Some(limit_px) = limit_px else { return Ok(()) };
-    let rise = |c: &&crate::report::comparison::Comparison| c.paired.rmse_difference_px.value;
+    let rise = |c: &&vice_run::report::comparison::Comparison| c.paired.rmse_difference_px.value;
     let worst = document.comparisons.iter().max_by(|a, b| rise(a).total_cmp(&rise(b)));
     match worst.filter(|c| rise(c) > limit_px) {
         Some(c) => anyhow::bail!(

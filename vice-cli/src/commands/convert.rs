@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use vice_core::dataset::GROUND_TRUTH;
-use vice_files::atomic::Overwrite;
-use vice_files::trajectory::{write_euroc, write_kitti, write_tum};
+use vice_run::core::dataset::GROUND_TRUTH;
+use vice_run::files::atomic::Overwrite;
+use vice_run::files::trajectory::{write_euroc, write_kitti, write_tum};
 
 use crate::inputs::DatasetArgs;
 use crate::terminal::Outcome;
@@ -41,7 +41,11 @@ enum Format {
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let dataset = args.dataset.open()?;
+    let spec = args.dataset.spec();
+    let dataset = spec.open_raw(&vice_run::formats::registry(&spec.plugins)?)?;
+    if spec.camera.is_some() {
+        spec.camera_name(dataset.as_ref())?;
+    }
     let trajectory = dataset.trajectory(&args.stream)?;
     let overwrite = if args.force { Overwrite::Replace } else { Overwrite::Refuse };
     match args.to {

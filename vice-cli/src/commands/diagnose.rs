@@ -1,22 +1,16 @@
 //! `vice diagnose`: which flaw explains the pixel errors, and the calibration without it.
 
-use std::fmt::Write;
 use std::path::PathBuf;
 
-use anyhow::Context;
-use vice_core::diagnose::{
-    Diagnosed, Diagnosis, DiagnosisDocument, Flaw, Options, Theta, VerdictKind, diagnose,
-};
-use vice_core::evaluate::Evaluation;
-use vice_core::metrics::align::Alignment;
-use vice_core::result::Role;
-use vice_core::time::Span;
-use vice_files::atomic::Overwrite;
-use vice_files::calibration::{CalibrationFile, CameraOverride};
+use vice_run::core::diagnose::{Flaw, Options};
+use vice_run::diagnosis::{Looking, diagnose_all};
+use vice_run::files::atomic::Overwrite;
+use vice_run::report::diagnosis_text::render;
+use vice_run::request::Scoring;
 
-use crate::inputs::{EvaluationArgs, LoadedStreams, Outputs, Scoring, to_json};
-use crate::report::table;
-use crate::terminal::{self, Outcome, Verbosity, advance, printable, usage};
+use crate::inputs::{EvaluationArgs, to_json};
+use crate::outputs::Outputs;
+use crate::terminal::{self, Outcome, Verbosity, usage, with_progress};
 
 /// Arguments of `vice diagnose`.
 #[derive(Debug, clap::Args)]
@@ -28,9 +22,9 @@ use crate::terminal::{self, Outcome, Verbosity, advance, printable, usage};
     --time-offset added, are 50 ms too late, and is corrected by a --time-offset that is 50 ms less.")]
 pub(crate) struct Args {
     #[command(flatten)]
-    pub(crate) evaluation: EvaluationArgs,
+    evaluation: EvaluationArgs,
     #[command(flatten)]
-    pub(crate) looking: LookingArgs,
+    looking: LookingArgs,
     /// Diagnosis document, vice.diagnosis/1; - prints it in place of the text.
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     json: Option<PathBuf>,
@@ -56,188 +50,55 @@ pub(crate) struct LookingArgs {
 }
 
 impl LookingArgs {
-    pub(crate) fn flaws(&self) -> Vec<Flaw> {
-        if self.flaws.is_empty() { Flaw::ALL.to_vec() } else { self.flaws.clone() }
+    pub(crate) fn spec(&self) -> Looking {
+        let options = Options { resamples: self.resamples as usize, seed: self.seed };
+        Looking { flaws: self.flaws.clone(), options }
     }
-
-    pub(crate) fn options(&self) -> Options {
-        Options { resamples: self.resamples as usize, seed: self.seed }
-    }
-}
-
-/// Nothing but the scored labels matters to a diagnosis.
-pub(crate) fn scoring() -> Scoring {
-    Scoring { subsets: vec![], align: Alignment::Se3, keep_samples: false }
 }
 
 pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
-    let outputs = Outputs::new(&[&args.json, &args.apply], &args.evaluation.files())?;
+    let request = args.evaluation.request(Scoring::default())?;
+    let outputs = Outputs::new(&[&args.json, &args.apply], &request.inputs())?;
     if let Some(apply) = args.apply.as_ref().filter(|a| a.extension().is_none_or(|e| e != "toml")) {
         return Err(usage(format!("--apply {}: name a file that ends in .toml", apply.display())));
     }
-    args.evaluation.with_evaluation(&scoring(), |evaluation, streams| {
-        let diagnosed = diagnose_all(evaluation, streams, &args.looking, verbosity)?;
-        if let ([_, _, ..], true) = (diagnosed.as_slice(), args.json.is_some() || args.apply.is_some()) {
-            return Err(usage("--json and --apply take one --estimate and one --depth"));
-        }
-        let mut texts = Vec::new();
-        if let (Some(path), Some(one)) = (&args.json, diagnosed.first()) {
-            texts.push((path, to_json(&one.document)?));
-        }
-        // What cannot be applied is known before anything is written.
-        let corrected = match (&args.apply, diagnosed.first()) {
-            (Some(_), Some(one)) => Some(corrected(evaluation, streams, one)?),
-            _ => None,
-        };
-        if !outputs.write(&texts)? {
-            let text: Vec<String> = diagnosed.iter().map(|d| render(&d.document)).collect();
-            terminal::print(&text.join("\n"))?;
-        }
-        if let (Some(file), Some(path)) = (corrected, &args.apply) {
-            file.write(path, Overwrite::Replace)?;
-            verbosity.note(&format!("the correction is in {}: use it with --calibration", path.display()));
-        }
-        Ok(Outcome::Done)
-    })
-}
-
-/// Each estimate with each depth source.
-fn diagnose_all(
-    evaluation: &Evaluation<'_>,
-    streams: &LoadedStreams,
-    looking: &LookingArgs,
-    verbosity: Verbosity,
-) -> anyhow::Result<Vec<Diagnosed>> {
-    let flaws = looking.flaws();
-    let mut all = Vec::new();
-    for (stream, _) in evaluation.streams.iter().enumerate().filter(|(_, s)| s.role == Role::Estimate) {
-        for depth in 0..evaluation.depths.len() {
-            let inertial = streams.inertial_run(stream);
-            let diagnosis =
-                Diagnosis { evaluation, stream, depth, inertial, flaws: &flaws, options: looking.options() };
-            let bar = verbosity.progress("fitting");
-            let diagnosed = diagnose(&diagnosis, &|done, total| {
-                advance(&bar, done, total);
-            });
-            bar.finish_and_clear();
-            let names =
-                || format!("{} with {}", evaluation.streams[stream].name, evaluation.depths[depth].name());
-            all.push(diagnosed.with_context(names)?);
-        }
+    let opened = request.open()?;
+    let looking = args.looking.spec();
+    let answers = with_progress(verbosity, |progress| diagnose_all(&request, &opened, &looking, progress))?;
+    if answers.len() > 1 && (args.json.is_some() || args.apply.is_some()) {
+        return Err(usage("--json and --apply take one --estimate and one --depth"));
     }
-    Ok(all)
-}
-
-/// The calibration in use without the named flaws.
-fn corrected(
-    evaluation: &Evaluation<'_>,
-    streams: &LoadedStreams,
-    diagnosed: &Diagnosed,
-) -> anyhow::Result<CalibrationFile> {
-    let (theta, verdict) = (&diagnosed.theta, &diagnosed.document.verdict);
-    anyhow::ensure!(
-        verdict.kind == VerdictKind::Named,
-        "--apply: nothing to apply, and nothing is written: {}",
-        verdict.sentence
-    );
-    let in_no_calibration = [Flaw::InitialTilt, Flaw::Scale, Flaw::Drift];
-    if let Some(flaw) = verdict.flaws.iter().find(|f| in_no_calibration.contains(f)) {
-        anyhow::bail!(
-            "--apply: {flaw} is a flaw of the estimate, which no calibration can correct: nothing is written"
-        );
-    }
-    let mut file = CalibrationFile::new();
-    let offset_s = streams.time_offset.as_secs_f64() - theta.of(Flaw::ClockOffset)[0];
-    file.time_offset = Some(Span::from_secs_f64(offset_s)?);
-    let camera = theta.correct_camera(evaluation.camera)?;
-    let body_from_camera = corrected_extrinsics(evaluation, theta)?;
-    file.insert(evaluation.camera_name, CameraOverride::of(&camera, body_from_camera));
-    Ok(file)
-}
-
-/// Extrinsics to write: none where they are right, since those of the data set may change with time.
-fn corrected_extrinsics(
-    evaluation: &Evaluation<'_>,
-    theta: &Theta,
-) -> anyhow::Result<Option<vice_core::frames::BodyFromCamera>> {
-    let wrong = [Flaw::ExtrinsicRotation, Flaw::ExtrinsicTranslation]
-        .iter()
-        .any(|flaw| theta.of(*flaw).iter().any(|v| *v != 0.0));
-    if let Some(fixed) = evaluation.body_from_camera {
-        return Ok(Some(theta.correct_extrinsics(&fixed)));
-    }
-    if !wrong {
-        return Ok(None);
-    }
-    let at =
-        |stamp: &vice_core::time::Stamp| evaluation.dataset.body_from_camera(evaluation.camera_name, *stamp);
-    let (Some(first), Some(last)) = (evaluation.frames.first(), evaluation.frames.last()) else {
-        anyhow::bail!("the camera has no frames");
-    };
-    let fixed = at(first)?;
-    anyhow::ensure!(
-        fixed == at(last)?,
-        "--apply: the camera moves against the body, so that no calibration file can hold its place: nothing is written"
-    );
-    Ok(Some(theta.correct_extrinsics(&fixed)))
-}
-
-/// The diagnosis as text.
-pub(crate) fn render(document: &DiagnosisDocument) -> String {
-    let mut text = String::new();
-    // Writing to a string cannot fail.
-    let _ = write_text(&mut text, document);
-    text
-}
-
-fn write_text(text: &mut String, document: &DiagnosisDocument) -> std::fmt::Result {
-    let (labels, verdict) = (&document.labels, &document.verdict);
-    writeln!(
-        text,
-        "{}, {} with {}: {:.3} px over {} labels of {} points ({} blocks of {})\n",
-        printable(&document.dataset),
-        printable(&document.stream),
-        printable(&document.depth),
-        document.rmse_px,
-        labels.scored,
-        labels.points,
-        labels.blocks,
-        labels.blocks_of,
-    )?;
-    let mut grid = vec![
-        ["flaw, fitted alone [95 %]", "leaves px", "explains", "likelier", "labels show"]
-            .map(String::from)
-            .to_vec(),
-    ];
-    for flaw in &document.flaws {
-        let shown = match flaw.rank {
-            0 => "nothing of it".to_string(),
-            rank if rank == flaw.of => "it".to_string(),
-            rank => format!("{rank} of {} directions", flaw.of),
-        };
-        grid.push(vec![
-            flaw.text.clone(),
-            format!("{:.3}", flaw.rmse_px),
-            format!("{:.0} %", flaw.explained_percent),
-            format!("{:+.0}", flaw.likelier),
-            shown,
-        ]);
-    }
-    text.push_str(&table::align(&grid));
-    writeln!(text, "\nverdict: {}", verdict.sentence)?;
-    match verdict.kind {
-        VerdictKind::Named => {
-            let [low, high] = [100.0 * verdict.sureness, 100.0].map(|v: f64| v.min(99.9));
-            writeln!(text, "sureness: {low:.1} %{}", if low < high { "" } else { " or more" })?;
-            for correction in &verdict.corrections {
-                writeln!(text, "correction: {correction}")?;
+    let mut failure: Option<anyhow::Error> = None;
+    let (mut texts, mut printed) = (Vec::new(), Vec::new());
+    for answer in answers {
+        match answer.outcome {
+            Ok((result, calibration)) => {
+                if let Some(path) = &args.json {
+                    texts.push((path, to_json(&result)?));
+                }
+                printed.push(render(&result.diagnosis));
+                match (&args.apply, calibration) {
+                    (Some(path), Ok(file)) => {
+                        file.write(path, Overwrite::Replace)?;
+                        verbosity.note(&format!(
+                            "the correction is in {}: use it with --calibration",
+                            path.display()
+                        ));
+                    }
+                    (Some(_), Err(error)) => failure = Some(error.into()),
+                    (None, _) => {}
+                }
+            }
+            // The others keep their answers.
+            Err(error) => {
+                if let Some(before) = failure.replace(error.into()) {
+                    terminal::print_error(&before);
+                }
             }
         }
-        VerdictKind::CannotTell => writeln!(text, "sureness: {:.1} %", 100.0 * verdict.sureness)?,
-        VerdictKind::NoFlaw => {}
     }
-    for help in &verdict.labels_that_help {
-        writeln!(text, "labels that would help: {help}")?;
+    if !outputs.write(&texts)? && !printed.is_empty() {
+        terminal::print(&printed.join("\n"))?;
     }
-    Ok(())
+    failure.map_or(Ok(Outcome::Done), Err)
 }

@@ -2,7 +2,9 @@
 
 use std::fmt::Write;
 
-use crate::formats::{Formats, PluginArgs};
+use vice_run::formats::Formats;
+
+use crate::inputs::PluginArgs;
 use crate::terminal::{self, Outcome, printable};
 
 /// Arguments of `vice formats`.
@@ -16,7 +18,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let formats = Formats::load(&args.plugins)?;
+    let formats = Formats::load(&args.plugins.spec())?;
     let mut text = String::new();
     for format in formats.registry.formats() {
         let shown = |s: &str| printable(s);

@@ -3,15 +3,16 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use vice_core::dataset::Dataset;
-use vice_core::result::ResultDocument;
+use vice_run::core::dataset::Dataset;
+use vice_run::formats;
+use vice_run::report::frames::Shots;
+use vice_run::report::html::{IMAGE_BUDGET_BYTES, Run, render};
+use vice_run::request::DatasetSpec;
+use vice_run::result::{self, ResultDocument};
 
-use crate::formats::{self, PluginArgs};
-use crate::inputs::{DatasetArgs, Outputs};
-use crate::report::frames::Shots;
-use crate::report::html::{IMAGE_BUDGET_BYTES, Run, render};
-use crate::report::result_file;
-use crate::terminal::{Outcome, Verbosity, advance, printable};
+use crate::inputs::PluginArgs;
+use crate::outputs::Outputs;
+use crate::terminal::{Outcome, Verbosity, printable, told, with_progress};
 
 /// Arguments of `vice report`.
 #[derive(Debug, clap::Args)]
@@ -38,20 +39,21 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     inputs.extend(args.dataset.clone());
     let out = Some(args.out.clone());
     let outputs = Outputs::new(&[&out], &inputs)?;
-    let documents: Vec<ResultDocument> =
-        args.results.iter().map(|path| result_file::read(path)).collect::<Result<_, _>>()?;
+    let documents: Vec<ResultDocument> = args.results.iter().map(result::read).collect::<Result<_, _>>()?;
     // The data sets are inputs too, which only the documents name.
-    let named = documents.iter().filter_map(|d| d.settings.dataset.as_ref()).map(PathBuf::from);
-    Outputs::new(&[&out], &named.collect::<Vec<_>>())?;
+    let named: Vec<PathBuf> = documents.iter().map(|d| d.request.dataset.path.clone()).collect();
+    Outputs::new(&[&out], &named)?;
     let budget = IMAGE_BUDGET_BYTES / documents.len().max(1);
     let several = documents.len() > 1;
     let runs: Vec<Run> = documents
         .into_iter()
         .zip(&args.results)
         .map(|(document, path)| {
-            let shots = match open(&document, args.dataset.as_ref(), &args.plugins) {
-                Ok(dataset) => with_progress(&document, dataset.as_ref(), budget, verbosity),
-                Err(error) => Shots::missing(format!("{error:#}; --dataset DIR says where the data set is")),
+            let shots = match open(&document, args) {
+                Ok(dataset) => shots(&document, dataset.as_ref(), budget, verbosity),
+                Err(error) => {
+                    Shots::missing(format!("{}; --dataset DIR says where the data set is", told(&error)))
+                }
             };
             if let Some(problem) = &shots.problem {
                 tracing::warn!("{}: {problem}", path.display());
@@ -69,38 +71,27 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
 }
 
 /// The pictures of a run, with a bar while they are decoded.
-pub(crate) fn with_progress(
+pub(crate) fn shots(
     document: &ResultDocument,
     dataset: &dyn Dataset,
     budget_bytes: usize,
     verbosity: Verbosity,
 ) -> Shots {
-    let bar = verbosity.progress("reading images");
-    let shots = Shots::of(document, dataset, budget_bytes, &|done, total| {
-        advance(&bar, done, total);
-    });
-    bar.finish_and_clear();
-    shots
+    with_progress(verbosity, |progress| {
+        Shots::of(document, dataset, budget_bytes, &|done, total| progress("reading images", done, total))
+    })
 }
 
 /// Opens the data set that a document names, or the folder it moved to, with the settings it was opened with.
-fn open(
-    document: &ResultDocument,
-    moved: Option<&PathBuf>,
-    plugins: &PluginArgs,
-) -> anyhow::Result<Arc<dyn Dataset>> {
-    let settings = &document.settings;
-    let path = moved.cloned().or_else(|| settings.dataset.as_ref().map(PathBuf::from));
-    let path = path.ok_or_else(|| anyhow::anyhow!("the result does not say where its data set is"))?;
-    let registry = formats::registry(plugins)?;
+fn open(document: &ResultDocument, args: &Args) -> anyhow::Result<Arc<dyn Dataset>> {
+    let asked = &document.request.dataset;
+    let path = args.dataset.clone().unwrap_or_else(|| asked.path.clone());
+    anyhow::ensure!(!path.as_os_str().is_empty(), "the result does not say where its data set is");
+    let mut plugins = args.plugins.spec();
+    // Those that read it then; who moved it may have moved them, too.
+    plugins.files.extend(asked.plugins.files.iter().filter(|f| f.is_file()).cloned());
+    let registry = formats::registry(&plugins)?;
     let known = registry.by_name(&document.dataset.format).is_ok();
-    let set = |(key, value): (&String, &String)| Some((key.strip_prefix("set ")?.to_string(), value.clone()));
-    let args = DatasetArgs {
-        path,
-        format: known.then(|| document.dataset.format.clone()),
-        settings: settings.other.iter().filter_map(set).collect(),
-        camera: None,
-        plugins: plugins.clone(),
-    };
-    args.open_in(&registry)
+    let spec = DatasetSpec { path, format: known.then(|| document.dataset.format.clone()), ..asked.clone() };
+    Ok(spec.open_raw(&registry)?)
 }

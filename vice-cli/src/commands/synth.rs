@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use vice_synthetic::{Synthetic, SyntheticOptions, write_euroc};
+use vice_run::synthetic::{Synthetic, SyntheticOptions, write_euroc};
 
 use crate::inputs::positive;
-use crate::terminal::{self, Outcome, Verbosity, advance};
+use crate::terminal::{self, Outcome, Verbosity, with_progress};
 
 /// Arguments of `vice synth`.
 #[derive(Debug, clap::Args)]
@@ -36,11 +36,9 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         ..SyntheticOptions::default()
     };
     let flight = Synthetic::new(options)?;
-    let bar = verbosity.progress("rendering");
-    write_euroc(&flight, &args.out, args.force, &|done, total| {
-        advance(&bar, done, total);
+    with_progress(verbosity, |progress| {
+        write_euroc(&flight, &args.out, args.force, &|done, total| progress("rendering", done, total))
     })?;
-    bar.finish_and_clear();
     terminal::print(&format!("wrote {}\n", args.out.display()))?;
     Ok(Outcome::Done)
 }

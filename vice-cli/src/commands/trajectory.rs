@@ -2,23 +2,17 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
-use serde::Serialize;
-use vice_core::metrics::align::{Alignment, align};
-use vice_core::metrics::associate::{Matching, PosePairs, crop};
-use vice_core::metrics::plane::Plane;
-use vice_core::metrics::rpe::{Delta, DeltaUnit, PairMode, PairsFrom, Rpe, RpeErrors, RpeOptions};
-use vice_core::metrics::trajectory::{Ape, ApeErrors, Statistics, Summary};
-use vice_core::time::{Span, Stamp};
-use vice_core::trajectory::Trajectory;
-use vice_files::atomic::Overwrite;
-use vice_files::trajectory::{ReadOptions, TrajectoryFormat, read_spec};
+use vice_run::core::metrics::align::Alignment;
+use vice_run::core::metrics::plane::Plane;
+use vice_run::core::metrics::rpe::DeltaUnit;
+use vice_run::core::time::{Span, Stamp};
+use vice_run::files::atomic::{self, Overwrite};
+use vice_run::request::EstimateSpec;
+use vice_run::trajectory::{TrajectoryRequest, compare_trajectories};
 
-use crate::inputs::{Outputs, span, span_not_negative, to_json};
-use crate::report::evo_zip::{self, About};
-use crate::report::plots::trajectory as plot;
-use crate::report::table;
-use crate::terminal::{self, Outcome, usage};
+use crate::inputs::{span, span_not_negative, to_json};
+use crate::outputs::Outputs;
+use crate::terminal::{self, Outcome};
 
 /// Arguments of `vice trajectory`.
 #[derive(Debug, clap::Args)]
@@ -29,28 +23,28 @@ use crate::terminal::{self, Outcome, usage};
 pub(crate) struct Args {
     /// Reference trajectory.
     #[arg(value_name = "REF")]
-    reference: String,
+    reference: EstimateSpec,
     /// Estimated trajectory.
     #[arg(value_name = "EST")]
-    estimate: String,
+    estimate: EstimateSpec,
     /// Alignment of the estimate: none, first-pose, yaw, se3, sim3.
     #[arg(long, value_name = "HOW", default_value = "none")]
     align: Alignment,
     /// Align on this many poses from the first on [default: all].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     n_to_align: Option<u64>,
-    /// Largest time difference of two poses that belong together, seconds.
-    #[arg(long, value_name = "S", default_value = "0.01", value_parser = span_not_negative)]
-    t_max_diff: Span,
+    /// Largest time difference of two poses that belong together, seconds [default: 0.01].
+    #[arg(long, value_name = "S", value_parser = span_not_negative)]
+    t_max_diff: Option<Span>,
     /// Seconds added to the stamps of the estimate.
     #[arg(long, value_name = "S", default_value = "0", allow_hyphen_values = true, value_parser = span)]
     t_offset: Span,
     /// Interpolate the reference at the stamps of the estimate instead of taking the nearest pose.
     #[arg(long)]
     interpolate: bool,
-    /// Widest gap of the reference that --interpolate bridges, seconds.
-    #[arg(long, value_name = "S", default_value = "0.1", value_parser = span_not_negative)]
-    max_gap: Span,
+    /// Widest gap of the reference that --interpolate bridges, seconds [default: 0.1].
+    #[arg(long, value_name = "S", value_parser = span_not_negative)]
+    max_gap: Option<Span>,
     /// Only from this stamp on, seconds.
     #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = stamp)]
     t_start: Option<Stamp>,
@@ -86,146 +80,51 @@ pub(crate) struct Args {
     evo_zip: Option<PathBuf>,
 }
 
-/// The document `vice.trajectory/1`.
-#[derive(Serialize)]
-struct Document {
-    schema: &'static str,
-    reference: String,
-    estimate: String,
-    matched: usize,
-    align: &'static str,
-    scale: f64,
-    rmse_3d_m: f64,
-    aoe_rad: f64,
-    roe_rad: Option<f64>,
-    ape: Ape,
-    rpe: Option<RpePart>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    rpe_problem: Option<String>,
-}
-
-#[derive(Serialize)]
-struct RpePart {
-    delta: f64,
-    delta_unit: &'static str,
-    all_pairs: bool,
-    #[serde(flatten)]
-    errors: Rpe,
+impl Args {
+    fn request(&self) -> TrajectoryRequest {
+        TrajectoryRequest {
+            reference: self.reference.clone(),
+            estimate: self.estimate.clone(),
+            align: self.align,
+            n_to_align: self.n_to_align.map(|n| usize::try_from(n).unwrap_or(usize::MAX)),
+            t_max_diff: self.t_max_diff,
+            t_offset: self.t_offset,
+            interpolate: self.interpolate,
+            max_gap: self.max_gap,
+            t_start: self.t_start,
+            t_end: self.t_end,
+            project_to_plane: self.project_to_plane,
+            delta: self.delta,
+            delta_unit: self.delta_unit,
+            all_pairs: self.all_pairs,
+            pairs_from_reference: self.pairs_from_reference,
+            times: self.times.clone(),
+        }
+    }
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let delta = Delta::new(args.delta, args.delta_unit).map_err(|e| usage(format!("--delta: {e}")))?;
-    let read_files =
-        [&args.reference, &args.estimate].map(|s| PathBuf::from(s.strip_prefix("rel:").unwrap_or(s)));
-    let outputs = Outputs::new(&[&args.json, &args.plot, &args.evo_zip], &read_files)?;
-    let (reference, estimate) = read_both(args)?;
-    // As evo: what the reference no longer has is not matched either.
-    let reference = crop(&reference, args.t_start, args.t_end).with_context(|| args.reference.clone())?;
-    let matching = match args.interpolate {
-        true => Matching::Interpolate { max_gap: args.max_gap },
-        false => Matching::Nearest { t_max_diff: args.t_max_diff },
-    };
-    let pairs = PosePairs::match_up(&reference, &estimate, matching, args.t_offset)
-        .with_context(|| format!("{} against {}", args.estimate, args.reference))?;
-    let n_to_align = args.n_to_align.map(|n| usize::try_from(n).unwrap_or(usize::MAX));
-    let transform = align(&pairs, args.align, n_to_align)
-        .with_context(|| format!("--align {} of {}", args.align.name(), args.estimate))?;
-    let mut pairs = transform.apply_to(&pairs);
-    if let Some(plane) = args.project_to_plane {
-        pairs = plane.project_pairs(&pairs);
-    }
-    let summary = Summary::of(&pairs)?;
-    let mode = if args.all_pairs { PairMode::All } else { PairMode::Consecutive };
-    let pairs_from = if args.pairs_from_reference { PairsFrom::Reference } else { PairsFrom::Estimate };
-    let options = RpeOptions { delta, mode, pairs_from };
-    let (rpe, rpe_problem) = match RpeErrors::of(&pairs, &options).and_then(|e| e.statistics()) {
-        Ok(errors) => (Some(errors), None),
-        Err(error) => (None, Some(error.to_string())),
-    };
-    let rpe = rpe.map(|errors| RpePart {
-        delta: args.delta,
-        delta_unit: args.delta_unit.name(),
-        all_pairs: args.all_pairs,
-        errors,
-    });
-    let document = Document {
-        schema: "vice.trajectory/1",
-        reference: args.reference.clone(),
-        estimate: args.estimate.clone(),
-        matched: pairs.len(),
-        align: args.align.name(),
-        scale: transform.scale,
-        rmse_3d_m: summary.rmse_3d_m,
-        aoe_rad: summary.aoe_rad,
-        roe_rad: summary.roe_rad,
-        ape: ApeErrors::of(&pairs).statistics()?,
-        rpe,
-        rpe_problem,
-    };
+    let request = args.request();
+    let outputs = Outputs::new(&[&args.json, &args.plot, &args.evo_zip], &request.inputs())?;
+    let compared = compare_trajectories(&request)?;
+    terminal::warn(compared.document.suspicions.iter());
     let mut texts = Vec::new();
     if let Some(path) = &args.json {
-        texts.push((path, to_json(&document)?));
+        texts.push((path, to_json(&compared.document)?));
     }
     if let Some(path) = &args.plot {
-        texts.push((path, plot::file(&pairs, &args.reference, &args.estimate)));
+        texts.push((path, compared.plot()));
     }
-    let (reference, estimated) = (args.reference.as_str(), args.estimate.as_str());
-    let about = About { reference, estimate: estimated, align: args.align.name(), transform: &transform };
-    let archive = args.evo_zip.as_ref().map(|path| anyhow::Ok((path, evo_zip::encode(&pairs, &about)?)));
-    if let Some((path, bytes)) = archive.transpose()? {
-        vice_files::atomic::write(path, Overwrite::Replace, |out| out.write_all(&bytes))?;
+    if let Some(path) = &args.evo_zip {
+        let bytes = compared.evo_zip()?;
+        atomic::write(path, Overwrite::Replace, |out| out.write_all(&bytes))?;
     }
     if !outputs.write(&texts)? {
-        terminal::print(&render(&document, estimate.len()))?;
+        terminal::print(&compared.table())?;
     }
     Ok(Outcome::Done)
 }
 
-/// Two KITTI files without times are compared row by row; one alone has no clock to compare by.
-fn read_both(args: &Args) -> anyhow::Result<(Trajectory, Trajectory)> {
-    let read = |spec: &str, index_as_seconds| {
-        read_spec(spec, &ReadOptions { times: args.times.clone(), index_as_seconds })
-    };
-    let (reference, estimate) = rayon::join(|| read(&args.reference, true), || read(&args.estimate, true));
-    let (mut reference, mut estimate) = (reference?, estimate?);
-    match (reference.format, estimate.format) {
-        (TrajectoryFormat::Kitti, TrajectoryFormat::Kitti) => {}
-        (TrajectoryFormat::Kitti, _) => reference = read(&args.reference, false)?,
-        (_, TrajectoryFormat::Kitti) => estimate = read(&args.estimate, false)?,
-        _ => {}
-    }
-    Ok((reference.trajectory, estimate.trajectory))
-}
-
 fn stamp(text: &str) -> Result<Stamp, String> {
     Stamp::parse_seconds(text).map_err(|e| e.to_string())
-}
-
-fn render(d: &Document, estimate_poses: usize) -> String {
-    let roe = d.roe_rad.map_or_else(|| "-".to_string(), |v| format!("{v:.4}"));
-    let mut text = format!(
-        "matched {} of {estimate_poses} poses, align {}{}\nRMSE_3D {:.4} m, AOE {:.4} rad, ROE {roe} rad\n\n",
-        d.matched,
-        d.align,
-        if d.scale == 1.0 { String::new() } else { format!(", scale {:.6}", d.scale) },
-        d.rmse_3d_m,
-        d.aoe_rad,
-    );
-    let mut grid = vec![["error", "rmse", "mean", "median", "std", "min", "max"].map(String::from).to_vec()];
-    let mut add = |name: String, s: &Statistics| {
-        let numbers = [s.rmse, s.mean, s.median, s.std, s.min, s.max];
-        grid.push(std::iter::once(name).chain(numbers.map(|v| format!("{v:.6}"))).collect());
-    };
-    add("APE translation m".to_string(), &d.ape.translation_m);
-    add("APE rotation rad".to_string(), &d.ape.rotation_rad);
-    if let Some(rpe) = &d.rpe {
-        let pairs = format!("{} {}, {} pairs", rpe.delta, rpe.delta_unit, rpe.errors.pairs);
-        add(format!("RPE translation m ({pairs})"), &rpe.errors.translation_m);
-        add("RPE rotation rad".to_string(), &rpe.errors.rotation_rad);
-    }
-    text.push_str(&table::align(&grid));
-    if let Some(problem) = &d.rpe_problem {
-        text.push_str(&format!("no RPE: {problem}\n"));
-    }
-    text
 }

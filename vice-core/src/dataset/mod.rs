@@ -4,6 +4,7 @@
 //! `world_from_body` and `body_from_camera`, a world whose z points up. Nothing is decoded that is not asked for:
 //! frames are stamps, pixels come one image at a time.
 
+mod calibrated;
 mod image;
 mod plane;
 
@@ -13,6 +14,7 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 
+pub use calibrated::Calibrated;
 pub use image::{DepthImage, Image, PixelFormat};
 pub use plane::{Floor, Plane};
 

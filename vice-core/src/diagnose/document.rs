@@ -5,7 +5,6 @@
 use serde::{Deserialize, Serialize};
 
 use super::flaw::Flaw;
-use crate::result::Settings;
 
 /// The schema's name and version.
 pub const SCHEMA: &str = "vice.diagnosis/1";
@@ -27,8 +26,6 @@ pub struct DiagnosisDocument {
     pub stream: String,
     /// The depth source.
     pub depth: String,
-    /// How it was evaluated.
-    pub settings: Settings,
     /// What it was diagnosed from.
     pub labels: LabelsPart,
     /// RMSE_2D of all points together as it is, pixels: `pooled_rmse_px` of an evaluation.

@@ -135,7 +135,7 @@ pub fn diagnose(
     let theta = found.named.fit.theta;
     let rmse = rmse_px(&problem.base);
     let part = |fit: &Fit, flaw: Flaw| flaw_part(&judge, fit, flaw, rmse);
-    let time_offset_s = evaluation.settings.time_offset_s;
+    let time_offset_s = evaluation.streams[stream].time_offset.as_secs_f64();
     let fitted: Vec<FlawPart> =
         found.named.fit.flaws.iter().map(|flaw| part(&found.named.fit, *flaw)).collect();
     let document = DiagnosisDocument {
@@ -146,7 +146,6 @@ pub fn diagnose(
         camera: evaluation.camera_name.to_string(),
         stream: evaluation.streams[stream].name.clone(),
         depth: evaluation.depths[depth].name().to_string(),
-        settings: evaluation.settings.clone(),
         labels,
         rmse_px: rmse,
         label_noise_px: noise.label_px,

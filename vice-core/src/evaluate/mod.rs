@@ -12,7 +12,6 @@
 mod curves;
 mod score;
 mod select;
-mod skip;
 mod spread;
 mod streams;
 pub(crate) mod trial;
@@ -22,19 +21,17 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 pub use select::{Observations, SelectedKeyframe, Selection, Window};
-pub use skip::{BEHIND_CAMERA, NOT_MANUAL, OCCLUDED, OUTSIDE_MODEL, SkipReason, UNCERTAIN};
 pub use streams::Stream;
 
 use crate::camera::{Camera, Pixel};
-use crate::dataset::{Dataset, Floor};
+use crate::dataset::Dataset;
 use crate::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
 use crate::error::{DataError, DataResult};
 use crate::frames::BodyFromCamera;
 use crate::metrics::align::Alignment;
 use crate::metrics::pixel::{pooled_rmse_px, subset_rmse_px};
-use crate::result::{
-    DatasetPart, PixelPart, PointName, ResultDocument, Role, SCHEMA, Sample, Settings, Skip,
-};
+use crate::result::{DatasetPart, Evaluated, PixelPart, PointName, Role, Sample, Skip};
+use crate::skip::SkipReason;
 use crate::suspicion::Suspicions;
 use crate::time::{Span, Stamp};
 
@@ -79,16 +76,16 @@ pub enum EvaluateError {
         suspicion: Option<String>,
     },
     /// No labelled frame lies in the window.
-    #[error("no label lies in the part of the run that was asked for (see --start, --duration)")]
+    #[error("no label lies in the part of the run that was asked for (see `start`, `duration`)")]
     EmptyWindow,
     /// No point has a key frame.
     #[error("no label is marked as a key frame, so that there is nothing to carry along")]
     NoKeyframe,
     /// No key frame is manual.
-    #[error("no key frame is manual, so that no manual label can be scored by itself (see --observations)")]
+    #[error("no key frame is manual, so that no manual label can be scored by itself (see `observations`)")]
     NoManualKeyframe,
     /// Every key frame is flagged as uncertain.
-    #[error("every key frame is flagged as uncertain, so that no label can be scored (see --observations)")]
+    #[error("every key frame is flagged as uncertain, so that no label can be scored (see `observations`)")]
     NoCertainKeyframe,
     /// More points are asked for than there are.
     #[error("subsets of {asked} points were asked for, but there are {points} points")]
@@ -98,6 +95,9 @@ pub enum EvaluateError {
         /// How many points there are.
         points: usize,
     },
+    /// There is no pose stream, or the anchor is none of them.
+    #[error("no pose stream is there to evaluate")]
+    NoStream,
     /// A stream has no pose within the evaluated frames.
     #[error("stream {stream} and the evaluated frames do not overlap in time: poses {} to {} ns, frames {} to {} ns{}",
         poses.0, poses.1, frames.0, frames.1, suspicion.as_ref().map_or_else(String::new, |s| format!(" ({s})")))]
@@ -121,14 +121,12 @@ pub enum EvaluateError {
 
 /// What is evaluated, and how.
 pub struct Evaluation<'a> {
-    /// The data set.
+    /// The data set; what a user overrides of it is a [`Calibrated`](crate::dataset::Calibrated) around it.
     pub dataset: &'a dyn Dataset,
     /// Name of its camera.
     pub camera_name: &'a str,
-    /// The camera's intrinsics, the data set's own or others.
+    /// The camera's intrinsics.
     pub camera: &'a Camera,
-    /// Extrinsics that replace the data set's.
-    pub body_from_camera: Option<BodyFromCamera>,
     /// The camera's frames.
     pub frames: &'a [Stamp],
     /// What takes part.
@@ -139,8 +137,6 @@ pub struct Evaluation<'a> {
     pub anchor: usize,
     /// The depth sources.
     pub depths: &'a [&'a dyn DepthSource],
-    /// A floor that replaces the data set's.
-    pub floor: Option<Floor>,
     /// Widest gap between two poses that is interpolated.
     pub max_gap: Span,
     /// Subset sizes; `None` for those up to 3 that exist.
@@ -149,8 +145,6 @@ pub struct Evaluation<'a> {
     pub align: Alignment,
     /// Whether the document lists the scored samples.
     pub keep_samples: bool,
-    /// What the document says about the settings.
-    pub settings: Settings,
 }
 
 /// Depths of the pixels at the key frames of one source, by frame and pixel bits.
@@ -173,7 +167,7 @@ pub type SampleSink<'a> = dyn FnMut(&str, &str, &[Sample]) -> std::io::Result<()
 pub fn evaluate(
     evaluation: &Evaluation<'_>,
     progress: &(dyn Fn(usize, usize) + Sync),
-) -> Result<ResultDocument, EvaluateError> {
+) -> Result<Evaluated, EvaluateError> {
     run(evaluation, progress, None)
 }
 
@@ -186,7 +180,7 @@ pub fn evaluate_streaming(
     evaluation: &Evaluation<'_>,
     progress: &(dyn Fn(usize, usize) + Sync),
     sink: &mut SampleSink<'_>,
-) -> Result<ResultDocument, EvaluateError> {
+) -> Result<Evaluated, EvaluateError> {
     run(evaluation, progress, Some(sink))
 }
 
@@ -194,12 +188,15 @@ fn run(
     evaluation: &Evaluation<'_>,
     progress: &(dyn Fn(usize, usize) + Sync),
     mut sink: Option<&mut SampleSink<'_>>,
-) -> Result<ResultDocument, EvaluateError> {
+) -> Result<Evaluated, EvaluateError> {
     let selection = evaluation.selection;
     let sizes = subset_sizes(evaluation.subsets, selection.point_count())?;
     let frames_range = selection.stamp_range(evaluation.frames).ok_or(EvaluateError::EmptyWindow)?;
     for stream in evaluation.streams {
         stream.check_overlap(frames_range)?;
+    }
+    if evaluation.anchor >= evaluation.streams.len() {
+        return Err(EvaluateError::NoStream);
     }
     let cameras = extrinsics(evaluation)?;
     let poses: Vec<_> = evaluation
@@ -254,9 +251,7 @@ fn run(
         }
     }
     let (trajectory, paths) = curves::trajectories(evaluation);
-    Ok(ResultDocument {
-        schema: SCHEMA.to_string(),
-        vice_version: env!("CARGO_PKG_VERSION").to_string(),
+    Ok(Evaluated {
         dataset: DatasetPart {
             name: evaluation.dataset.name().to_string(),
             format: evaluation.dataset.format().to_string(),
@@ -264,7 +259,6 @@ fn run(
             image_size_px: Some([evaluation.camera.width(), evaluation.camera.height()]),
             first_frame_ns: evaluation.frames.first().copied(),
         },
-        settings: evaluation.settings.clone(),
         pixel,
         trajectory,
         paths,
@@ -284,9 +278,6 @@ fn subset_sizes(asked: Option<&[usize]>, points: usize) -> Result<Vec<usize>, Ev
 
 /// Extrinsics at the selected frames. A frame without is skipped and counted; only where all lack them it is an error.
 fn extrinsics(evaluation: &Evaluation<'_>) -> DataResult<Vec<Option<BodyFromCamera>>> {
-    if let Some(fixed) = evaluation.body_from_camera {
-        return Ok(vec![Some(fixed); evaluation.selection.frames.len()]);
-    }
     let mut first_error = None;
     let mut found = Vec::with_capacity(evaluation.selection.frames.len());
     for frame in &evaluation.selection.frames {
@@ -334,10 +325,7 @@ fn keyframe_depths(
                 camera: evaluation.camera,
                 body_from_camera,
                 world_from_camera: anchor[at].ok().map(|pose| pose * body_from_camera),
-                floor: match evaluation.floor {
-                    Some(floor) => floor,
-                    None => evaluation.dataset.floor(stamp)?,
-                },
+                floor: evaluation.dataset.floor(stamp)?,
             };
             let list: Vec<Pixel> = pixels.values().copied().collect();
             let depths = source.depths(&keyframe, &list)?;
@@ -357,7 +345,7 @@ fn position(selected: &[usize], frame: usize) -> usize {
 }
 
 fn skip(point: &PointName, stamp: Stamp, reason: SkipReason) -> Skip {
-    Skip { point: point.clone(), timestamp_ns: stamp, reason: reason.name().to_string() }
+    Skip { point: point.clone(), timestamp_ns: stamp, reason }
 }
 
 #[cfg(test)]

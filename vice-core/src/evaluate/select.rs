@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use super::{EvaluateError, SkipReason};
 use crate::camera::Camera;
 use crate::label::{LabelSet, Observation, ObservationSource};
@@ -22,7 +24,8 @@ pub struct Window {
 }
 
 /// Whose labels count.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Observations {
     /// Those that whoever made them is sure of. A segment whose key frame is flagged as uncertain is left out as a
@@ -134,6 +137,11 @@ impl<'s> SelectedKeyframe<'s> {
 }
 
 impl<'a> Selection<'a> {
+    /// Names of the points that take part.
+    pub fn point_names(&self) -> impl Iterator<Item = &str> {
+        self.points.iter().map(|p| p.name.as_ref())
+    }
+
     /// Matches labels with frames by their exact stamp and keeps those of the window.
     ///
     /// A segment whose key frame lies before the window keeps that key frame: it says what the point is.

@@ -19,12 +19,19 @@ pub struct Stream {
     pub role: Role,
     /// Its poses, any clock offset already added.
     pub trajectory: Trajectory,
+    /// The clock offset that was added to its stamps.
+    pub time_offset: Span,
 }
 
 /// A pose for each selected frame, or why there is none.
 pub(crate) type PosesAtFrames = Vec<Result<WorldFromBody, NoPose>>;
 
 impl Stream {
+    /// A stream with its stamps as they are.
+    pub fn new(name: impl Into<String>, role: Role, trajectory: Trajectory) -> Self {
+        Self { name: name.into(), role, trajectory, time_offset: Span::ZERO }
+    }
+
     pub(super) fn poses_at(&self, frames: &[Stamp], selected: &[usize], max_gap: Span) -> PosesAtFrames {
         selected.iter().map(|frame| self.trajectory.pose_at(frames[*frame], max_gap)).collect()
     }

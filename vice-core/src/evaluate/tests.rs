@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::camera::Model;
-use crate::dataset::Image;
+use crate::dataset::{Floor, Image};
 use crate::frames::{Body, Rigid, World, WorldFromBody};
 use crate::label::{LabelRow, LabelSet, Observation, ObservationSource};
 use crate::result::Role;
@@ -71,6 +71,9 @@ impl DepthSource for FloorOfTest {
     fn name(&self) -> &str {
         "floor"
     }
+    fn needs_world(&self, _: &Floor) -> bool {
+        true
+    }
     fn depths(
         &self,
         keyframe: &Keyframe<'_>,
@@ -120,28 +123,25 @@ fn exact() -> Trajectory {
 }
 
 fn stream(role: Role, trajectory: Trajectory) -> Stream {
-    Stream { name: format!("{role:?}").to_lowercase(), role, trajectory }
+    Stream::new(format!("{role:?}").to_lowercase(), role, trajectory)
 }
 
-fn run(labels: &LabelSet, streams: &[Stream], window: Window) -> Result<ResultDocument, EvaluateError> {
+fn run(labels: &LabelSet, streams: &[Stream], window: Window) -> Result<Evaluated, EvaluateError> {
     let flyer = flyer();
     let selection = Selection::new(labels, &flyer.frames, &flyer.camera, &window)?;
     let evaluation = Evaluation {
         dataset: &flyer,
         camera_name: "cam0",
         camera: &flyer.camera,
-        body_from_camera: None,
         frames: &flyer.frames,
         selection: &selection,
         streams,
         anchor: 0,
         depths: &[&FloorOfTest],
-        floor: None,
         max_gap: Span::from_millis(100),
         subsets: None,
         align: Alignment::Se3,
         keep_samples: true,
-        settings: Settings::default(),
     };
     evaluate(&evaluation, &|_, _| {})
 }
@@ -161,7 +161,7 @@ fn exact_poses_give_no_error_and_every_sample_is_scored() {
     assert!(t.rmse_3d_m.unwrap() < 1e-9 && t.aoe_rad.unwrap() < 1e-7 && t.roe_rad.unwrap() < 1e-7);
     assert_eq!(document.worst_skipped_percent(), 0.0);
     let text = serde_json::to_string(&document).unwrap();
-    assert_eq!(serde_json::from_str::<ResultDocument>(&text).unwrap(), document);
+    assert_eq!(serde_json::from_str::<Evaluated>(&text).unwrap(), document);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use crate::depth::{DepthSample, DepthSource};
 use crate::error::DataResult;
 use crate::frames::BodyFromCamera;
 use crate::metrics::align::Alignment;
-use crate::result::{Sample, Settings};
+use crate::result::Sample;
 use crate::time::Stamp;
 
 /// Extrinsics at the selected frames.
@@ -83,18 +83,15 @@ impl<'a> Trial<'a> {
             dataset: e.dataset,
             camera_name: e.camera_name,
             camera,
-            body_from_camera: e.body_from_camera,
             frames: e.frames,
             selection: e.selection,
             streams: e.streams,
             anchor: e.anchor,
             depths: e.depths,
-            floor: e.floor,
             max_gap: e.max_gap,
             subsets: None,
             align: Alignment::None,
             keep_samples: true,
-            settings: Settings::default(),
         }
     }
 }

@@ -5,7 +5,6 @@ pub mod associate;
 pub mod by_age;
 pub mod held;
 pub mod interval;
-pub mod paired;
 pub mod pixel;
 pub mod plane;
 pub mod rotation_offset;

@@ -22,7 +22,8 @@ pub const MAX_PAIRS: usize = 1 << 24;
 pub const ALL_PAIRS_TOLERANCE: f64 = 0.1;
 
 /// What the stretch between two poses is measured in.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum DeltaUnit {
     /// Number of paired poses.
     #[default]

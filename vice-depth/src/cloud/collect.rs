@@ -113,7 +113,7 @@ impl Collector {
         let needed = points.saturating_mul(BYTES_PER_POINT);
         let hint = match self.voxel_m {
             Some(edge) => format!("thin it more than with voxels of {edge} m"),
-            None => "thin it with --cloud-voxel 0.01, or larger".to_string(),
+            None => "thin it with `cloud-voxel` 0.01, or larger".to_string(),
         };
         DataError::new(format!(
             "a scan of {points} points takes {}, and {} may be used",
@@ -219,7 +219,7 @@ mod tests {
         let mut collector = Collector::new(&options(None, 1_000_000)).unwrap();
         let error = collector.expect(50_000_000, Some(50_000_000)).unwrap_err().to_string();
         assert!(error.starts_with("a scan of 50000000 points takes 7"), "{error}");
-        assert!(error.contains("1.0 MB may be used") && error.contains("--cloud-voxel"), "{error}");
+        assert!(error.contains("1.0 MB may be used") && error.contains("`cloud-voxel`"), "{error}");
         // A text file's promise is not backed by its length: the points themselves must not run over the limit.
         let mut collector = Collector::new(&options(None, 1_000_000)).unwrap();
         collector.expect(u64::MAX, None).unwrap();

@@ -18,6 +18,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 use vice_core::camera::{Camera, Pixel};
+use vice_core::dataset::Floor;
 use vice_core::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
 use vice_core::error::DataResult;
 use vice_core::frames::{self, Rigid, World};
@@ -135,6 +136,10 @@ impl ZMapDepth {
 impl DepthSource for ZMapDepth {
     fn name(&self) -> &str {
         "zmap"
+    }
+
+    fn needs_world(&self, _: &Floor) -> bool {
+        true
     }
 
     fn roughness(&self) -> f64 {

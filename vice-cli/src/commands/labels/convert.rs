@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use vice_files::atomic::Overwrite;
-use vice_files::labels::{self, LabelFormat};
+use vice_run::files::atomic::Overwrite;
+use vice_run::files::labels::{self, LabelFormat};
+use vice_run::request::DatasetSpec;
 
-use crate::formats::PluginArgs;
-use crate::inputs::DatasetArgs;
+use crate::inputs::PluginArgs;
 use crate::terminal::{self, Outcome};
 
 /// Arguments of `vice labels convert`.
@@ -38,15 +38,14 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let frames = match &args.dataset {
         Some(path) => {
-            let open = DatasetArgs {
+            let spec = DatasetSpec {
                 path: path.clone(),
-                format: None,
-                settings: vec![],
                 camera: args.camera.clone(),
-                plugins: args.plugins.clone(),
+                plugins: args.plugins.spec(),
+                ..DatasetSpec::default()
             };
-            let dataset = open.open()?;
-            let camera = open.camera_name(dataset.as_ref())?;
+            let dataset = spec.open_raw(&vice_run::formats::registry(&spec.plugins)?)?;
+            let camera = spec.camera_name(dataset.as_ref())?;
             Some((dataset.name().to_string(), camera.clone(), dataset.frames(&camera)?))
         }
         None => None,

@@ -1,18 +1,17 @@
 //! `vice labels detect`: calibration targets as labels.
 
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use vice_core::evaluate::Window;
-use vice_core::label::{LabelRow, LabelSet};
-use vice_core::time::Span;
-use vice_detect::{BoardSize, DetectOptions, DetectReport, TagFamily, TagOptions, additions, detect_labels};
-use vice_files::atomic::Overwrite;
-use vice_files::calibration::CalibrationFile;
-use vice_files::labels::{self, LabelFormat};
+use vice_run::core::label::LabelSet;
+use vice_run::core::time::Span;
+use vice_run::detect::{BoardSize, DetectOptions, DetectReport, TagFamily, TagOptions};
+use vice_run::detecting::detect_to_file;
+use vice_run::files::labels::LabelFormat;
+use vice_run::request::DatasetSpec;
 
-use crate::inputs::{DatasetArgs, Outputs, positive, span_not_negative};
-use crate::terminal::{self, Outcome, Verbosity, advance, printable, usage};
+use crate::inputs::{DatasetArgs, WindowArgs, span_not_negative};
+use crate::outputs::Outputs;
+use crate::terminal::{self, Outcome, Verbosity, printable, with_progress};
 
 /// Arguments of `vice labels detect`.
 #[derive(Debug, clap::Args)]
@@ -55,15 +54,8 @@ struct TargetArgs {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Frames")]
 struct FrameArgs {
-    /// Look at the frame nearest to each tick of this rate [default: all frames].
-    #[arg(long, value_name = "HZ", value_parser = positive)]
-    fps: Option<f64>,
-    /// Seconds after the camera's first frame.
-    #[arg(long, value_name = "S", default_value = "0", allow_hyphen_values = true, value_parser = span_not_negative)]
-    start: Span,
-    /// Seconds from there [default: to the end].
-    #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = span_not_negative)]
-    duration: Option<Span>,
+    #[command(flatten)]
+    window: WindowArgs,
     /// A point unseen for longer starts anew, seconds.
     #[arg(long, value_name = "S", default_value = "3", allow_hyphen_values = true, value_parser = span_not_negative)]
     respawn_after: Span,
@@ -88,33 +80,9 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     let out = &args.output.out;
     // Before the work, so that a wrong name costs nothing.
     LabelFormat::for_writing(out)?;
-    Outputs::new(&[&Some(out.clone())], std::slice::from_ref(&args.dataset.path))?;
-    let before = match (out.exists(), args.output.add) {
-        (true, false) => {
-            return Err(usage(format!(
-                "{} exists already (--add adds to it; or name another file)",
-                out.display()
-            )));
-        }
-        (exists, _) => exists,
-    };
-    let calibration = args.targets.calibration.as_ref().map(CalibrationFile::read).transpose()?;
-    let dataset = args.dataset.open()?;
-    let used = args.dataset.used_camera(dataset.as_ref(), calibration.as_ref())?;
-    let there = before.then(|| labels::read(out, Some(&used.frames))).transpose()?;
-    if let Some(other) = there.as_ref().and_then(|l| l.camera.as_ref()).filter(|c| **c != used.name) {
-        return Err(usage(format!("{} holds labels of camera {other}, not {}", out.display(), used.name)));
-    }
-    let window = Window {
-        fps: args.frames.fps,
-        start: args.frames.start,
-        duration: args.frames.duration,
-        ..Window::default()
-    };
-    let frames = window.frames(&used.frames);
-    if frames.is_empty() {
-        anyhow::bail!("no frame lies in the part of the run that was asked for (see --start, --duration)");
-    }
+    let dataset = DatasetSpec { calibration: args.targets.calibration.clone(), ..args.dataset.spec() };
+    Outputs::new(&[&Some(out.clone())], std::slice::from_ref(&dataset.path))?;
+    let opened = dataset.open()?;
     let options = DetectOptions {
         tags: args
             .targets
@@ -125,59 +93,12 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         select: args.output.select.map(|n| n as usize),
         ..DetectOptions::default()
     };
-    let bar = verbosity.progress("looking");
-    let found =
-        detect_labels(dataset.as_ref(), &used.name, &used.camera, &frames, &options, &|done, total| {
-            advance(&bar, done, total);
-            ControlFlow::Continue(())
-        })?;
-    bar.finish_and_clear();
-    warn(&found.report);
-    if found.labels.points().is_empty() {
-        anyhow::bail!("{}: {}", args.dataset.path.display(), nothing_found(&options, &found.report));
-    }
-    let labels = match there {
-        Some(there) => added(there, &found.labels)?,
-        None => found.labels.clone(),
-    };
-    let overwrite = if args.output.add { Overwrite::Replace } else { Overwrite::Refuse };
-    labels::write(out, &labels, overwrite)?;
+    let protocol = args.frames.window.spec();
+    let found = with_progress(verbosity, |progress| {
+        detect_to_file(&opened, &protocol, &options, (out, args.output.add), progress)
+    })?;
     terminal::print(&summary(args, &found.labels, &found.report))?;
     Ok(Outcome::Done)
-}
-
-/// All labels that are there, and the new ones of points and frames that have none.
-fn added(there: LabelSet, new: &LabelSet) -> anyhow::Result<LabelSet> {
-    let more = additions(&there, new);
-    let rows = there
-        .points()
-        .iter()
-        .flat_map(|p| p.observations.iter().map(|o| LabelRow { point: p.name.clone(), observation: *o }));
-    let mut labels = LabelSet::from_rows(rows.chain(more))?;
-    labels.dataset = there.dataset.or_else(|| new.dataset.clone());
-    labels.camera = there.camera.or_else(|| new.camera.clone());
-    Ok(labels)
-}
-
-fn warn(report: &DetectReport) {
-    if let Some((stamp, reason)) = report.undecoded.first() {
-        let count = report.undecoded.len();
-        tracing::warn!(
-            "{count} frames could not be decoded and were skipped, the first at {stamp} ns: {reason}"
-        );
-    }
-    if report.twice > 0 {
-        tracing::warn!("{} tags were left out: a frame holds two of the same number", report.twice);
-    }
-}
-
-/// Why there are no labels, and what to ask for instead.
-fn nothing_found(options: &DetectOptions, report: &DetectReport) -> String {
-    let text = report.nothing_found(options);
-    match report.other_board {
-        Some((w, h, _)) => format!("{text}: --chessboard {w}x{h}?"),
-        None => text,
-    }
 }
 
 fn summary(args: &Args, labels: &LabelSet, report: &DetectReport) -> String {

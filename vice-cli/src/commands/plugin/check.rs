@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use anyhow::Context;
-use vice_host::conformance::{Event, Verdict};
+use vice_run::host::conformance::{Event, Verdict};
 
 use super::child;
 use crate::terminal::{self, Outcome, printable, usage};

@@ -3,9 +3,9 @@
 use std::io::Write;
 use std::process;
 
-use vice_core::dataset::OpenOptions;
-use vice_host::conformance::{self, Event, Subject, Thoroughness, Verdict};
-use vice_host::{LoadOptions, Plugin};
+use vice_run::core::dataset::OpenOptions;
+use vice_run::host::conformance::{self, Event, Subject, Thoroughness, Verdict};
+use vice_run::host::{LoadOptions, Plugin};
 
 use super::check::Args;
 use crate::terminal::{self, Outcome, printable};

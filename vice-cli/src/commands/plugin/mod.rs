@@ -3,7 +3,6 @@
 mod check;
 mod child;
 mod new;
-mod project;
 
 use crate::terminal::Outcome;
 

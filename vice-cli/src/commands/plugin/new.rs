@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use super::project;
+use vice_run::plugin as project;
+
 use crate::terminal::{self, Outcome, usage};
 
 /// Arguments of `vice plugin new`.
@@ -50,7 +51,7 @@ fn name(text: &str) -> Result<String, String> {
     if RESERVED.split(' ').any(|word| word == text) {
         return Err("this is a word of Rust or C++; choose another name".to_string());
     }
-    if crate::formats::built_in().by_name(text).is_ok() {
+    if vice_run::formats::built_in().by_name(text).is_ok() {
         return Err("this format is built in; choose another name".to_string());
     }
     Ok(text.to_string())

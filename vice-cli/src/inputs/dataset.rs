@@ -1,0 +1,63 @@
+//! Which data set, which camera of it, and plugins.
+
+use std::path::PathBuf;
+
+use vice_run::request::{DatasetSpec, PluginsSpec};
+
+/// Which data set, and which camera of it.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Data set")]
+pub(crate) struct DatasetArgs {
+    /// Folder or file of the data set.
+    #[arg(value_name = "DATASET", required = true)]
+    pub(crate) path: Option<PathBuf>,
+    /// Format of the data set [default: found by looking].
+    #[arg(long, value_name = "NAME")]
+    pub(crate) format: Option<String>,
+    /// Setting of the format; `vice formats` lists them.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = setting)]
+    pub(crate) settings: Vec<(String, String)>,
+    /// Camera [default: the first].
+    #[arg(long, value_name = "NAME")]
+    pub(crate) camera: Option<String>,
+    #[command(flatten)]
+    pub(crate) plugins: PluginArgs,
+}
+
+/// Which plugins are loaded beside those in `VICE_PLUGIN_PATH` and the user's folder.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub(crate) struct PluginArgs {
+    /// Plugin to load, a shared library; goes before a built-in format of the same name. May be repeated.
+    #[arg(long = "plugin", value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+    /// Load plugins even from files or folders that others may write to.
+    #[arg(long)]
+    pub(crate) allow_writable_plugin: bool,
+}
+
+impl DatasetArgs {
+    /// The data set without anything that overrides it.
+    pub(crate) fn spec(&self) -> DatasetSpec {
+        DatasetSpec {
+            path: self.path.clone().unwrap_or_default(),
+            format: self.format.clone(),
+            set: self.settings.iter().cloned().collect(),
+            camera: self.camera.clone(),
+            plugins: self.plugins.spec(),
+            ..DatasetSpec::default()
+        }
+    }
+}
+
+impl PluginArgs {
+    pub(crate) fn spec(&self) -> PluginsSpec {
+        PluginsSpec { files: self.files.clone(), allow_writable: self.allow_writable_plugin }
+    }
+}
+
+pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.is_empty() => Ok((key.trim().to_string(), value.trim().to_string())),
+        _ => Err("expected KEY=VALUE".to_string()),
+    }
+}

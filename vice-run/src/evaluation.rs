@@ -1,0 +1,145 @@
+//! From a request to what the pipeline takes, and through it to a document.
+
+use vice_core::depth::DepthSource;
+use vice_core::evaluate::{EvaluateError, Evaluation, SampleSink, Selection, evaluate, evaluate_streaming};
+use vice_core::label::LabelSet;
+use vice_core::time::Stamp;
+
+use crate::error::{Context, RunError, RunResult};
+use crate::open::Opened;
+use crate::request::{LabelsSpec, Request};
+use crate::result::{ResultDocument, Used};
+use crate::streams::LoadedStreams;
+
+/// Called with what is being done, and (done, total) of it.
+pub type Progress<'a> = dyn Fn(&'static str, usize, usize) + Sync + 'a;
+
+/// Progress for those who do not show it.
+pub fn silent(_: &'static str, _: usize, _: usize) {}
+
+/// Evaluates a request.
+///
+/// # Errors
+/// [`RunError`] if something that is asked for is not there, cannot be read or fits nothing else.
+pub fn evaluate_request(request: &Request, progress: &Progress<'_>) -> RunResult<ResultDocument> {
+    request.evaluate(&request.open()?, Samples::Keep, progress)
+}
+
+/// What becomes of the scored samples, of which a long run has millions.
+pub enum Samples<'a> {
+    /// The document lists them.
+    Keep,
+    /// They are left out.
+    Drop,
+    /// They go to this sink as they come, and the document has none.
+    Stream(&'a mut SampleSink<'a>),
+}
+
+impl LabelsSpec {
+    /// Reads the labels, or those of the chosen points.
+    ///
+    /// # Errors
+    /// [`RunError`] if the file cannot be read, or has not the points that are asked for.
+    pub fn read(&self, frames: &[Stamp]) -> RunResult<LabelSet> {
+        if self.file.as_os_str().is_empty() {
+            return Err(RunError::usage("labels", "no file of labels is named"));
+        }
+        let labels = vice_files::labels::read(&self.file, Some(frames))?;
+        tracing::info!("{} points with {} labels", labels.points().len(), labels.observation_count());
+        if self.points.is_empty() {
+            return Ok(labels);
+        }
+        labels.select(&self.points).map_err(|unknown| {
+            let names: Vec<&str> = labels.points().iter().map(|p| p.name.as_str()).collect();
+            RunError::usage("points", format!("there is no point {unknown}; there are {}", names.join(", ")))
+        })
+    }
+}
+
+impl Request {
+    /// Opens the recording that is asked about, once the request itself makes sense.
+    ///
+    /// # Errors
+    /// [`RunError`] if the request contradicts itself or the recording cannot be opened.
+    pub fn open(&self) -> RunResult<Opened> {
+        self.check()?;
+        self.dataset.open()
+    }
+
+    /// Runs the pipeline on the recording.
+    ///
+    /// # Errors
+    /// [`RunError`] if what is asked for cannot be evaluated.
+    pub fn evaluate(
+        &self,
+        opened: &Opened,
+        samples: Samples<'_>,
+        progress: &Progress<'_>,
+    ) -> RunResult<ResultDocument> {
+        let keep = matches!(samples, Samples::Keep);
+        self.with_evaluation(opened, keep, |evaluation, streams| {
+            let step = |done, total| progress("evaluating", done, total);
+            let mut found = match samples {
+                Samples::Stream(sink) => evaluate_streaming(evaluation, &step, sink)?,
+                _ => evaluate(evaluation, &step)?,
+            };
+            found.suspicions.extend(streams.suspicions.clone());
+            let used = Used {
+                points: evaluation.selection.point_names().map(str::to_string).collect(),
+                anchor: streams.list[streams.anchor].name.clone(),
+                time_offset_s: streams.time_offset.as_secs_f64(),
+                align: evaluation.align.name().to_string(),
+            };
+            Ok(ResultDocument::new(self.clone(), used, found))
+        })
+    }
+
+    /// Opens everything that an evaluation needs and hands it to `work`.
+    ///
+    /// # Errors
+    /// [`RunError`] if something is not there, cannot be read or does not fit, and that of `work`.
+    pub fn with_evaluation<T>(
+        &self,
+        opened: &Opened,
+        keep_samples: bool,
+        work: impl FnOnce(&Evaluation<'_>, &LoadedStreams) -> RunResult<T>,
+    ) -> RunResult<T> {
+        let labels = self.labels.read(&opened.frames)?;
+        let in_labels = |error: EvaluateError| match error {
+            EvaluateError::Data(error) => RunError::from(error),
+            error => match Err::<(), _>(error).context(|| self.labels.file.display().to_string()) {
+                Err(error) => error,
+                Ok(()) => RunError::usage("labels", "cannot be used"),
+            },
+        };
+        let selection =
+            Selection::new(&labels, &opened.frames, &opened.camera, &self.window()).map_err(in_labels)?;
+        if let Some(asked) = self.scoring.subsets.iter().find(|n| **n > selection.point_count()) {
+            let points = selection.point_count();
+            return Err(EvaluateError::SubsetTooLarge { asked: *asked, points }.into());
+        }
+        let mut streams = self.streams.load(opened, &selection)?;
+        for stream in &streams.list {
+            let t = &stream.trajectory;
+            tracing::info!("stream {}: {} poses, {} to {} ns", stream.name, t.len(), t.start(), t.end());
+        }
+        let sources = self.depth.make_all(opened)?;
+        let sources: Vec<&dyn DepthSource> = sources.iter().map(AsRef::as_ref).collect();
+        self.streams.check_world(opened, &mut streams, &selection, &sources)?;
+        let evaluation = Evaluation {
+            dataset: opened.dataset.as_ref(),
+            camera_name: &opened.camera_name,
+            camera: &opened.camera,
+            frames: &opened.frames,
+            selection: &selection,
+            streams: &streams.list,
+            anchor: streams.anchor,
+            depths: &sources,
+            max_gap: self.streams.max_gap,
+            subsets: (!self.scoring.subsets.is_empty()).then_some(self.scoring.subsets.as_slice()),
+            align: self.scoring.align,
+            keep_samples,
+        };
+        work(&evaluation, &streams)
+    }
+}

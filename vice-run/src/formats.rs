@@ -1,0 +1,114 @@
+//! The formats that are known: those built in, and those of plugins.
+
+use vice_core::error::one_line;
+use vice_core::registry::Registry;
+use vice_host::{LoadOptions, Plugin, search};
+
+use crate::error::{RunError, RunResult};
+use crate::request::PluginsSpec;
+
+/// A format that came with a library.
+pub struct LoadedPlugin {
+    /// The library.
+    pub plugin: Plugin,
+    /// Whether it took the place of a built-in format.
+    pub replaces: bool,
+}
+
+/// All formats, and where those of plugins came from.
+pub struct Formats {
+    /// All formats by name, those of plugins among them.
+    pub registry: Registry,
+    /// Formats of plugins.
+    pub plugins: Vec<LoadedPlugin>,
+    /// Why libraries that nobody named were not loaded, one line each.
+    pub left_out: Vec<String>,
+}
+
+/// The formats that are built in.
+pub fn built_in() -> Registry {
+    let mut registry = Registry::new();
+    registry.add(Box::new(vice_blackbird::Blackbird));
+    registry.add(Box::new(vice_euroc::Euroc));
+    registry.add(Box::new(vice_locobot::Locobot));
+    registry.add(Box::new(vice_video::Video));
+    registry
+}
+
+/// A registry of all formats; what was left out is a warning.
+///
+/// # Errors
+/// As [`Formats::load`].
+pub fn registry(plugins: &PluginsSpec) -> RunResult<Registry> {
+    let formats = Formats::load(plugins)?;
+    for line in &formats.left_out {
+        tracing::warn!("{line}");
+    }
+    Ok(formats.registry)
+}
+
+impl Formats {
+    /// Loads plugins: those named, which must load, then those found where plugins lie, which may not.
+    ///
+    /// # Errors
+    /// [`RunError`] if a named one does not load, or two named ones read the same format.
+    pub fn load(plugins: &PluginsSpec) -> RunResult<Self> {
+        let options = LoadOptions { allow_writable: plugins.allow_writable };
+        let mut formats = Self { registry: built_in(), plugins: Vec::new(), left_out: Vec::new() };
+        for file in &plugins.files {
+            formats.named(Plugin::load(file, &options)?)?;
+        }
+        let found = search::find();
+        formats.left_out.extend(found.remarks);
+        for file in found.libraries {
+            match Plugin::load(&file, &options) {
+                Ok(plugin) => formats.found(plugin),
+                Err(error) => formats.left_out.push(format!("plugin {}", one_line(&error))),
+            }
+        }
+        Ok(formats)
+    }
+
+    /// One that the user named goes before what is built in, but two of them must not compete.
+    fn named(&mut self, plugin: Plugin) -> RunResult<()> {
+        let name = plugin.info().name.clone();
+        match self.plugins.iter().find(|p| p.plugin.info().name == name) {
+            Some(same) if same.plugin.path() == plugin.path() => Ok(()),
+            Some(other) => Err(RunError::usage(
+                "plugin",
+                format!(
+                    "{} and {} both read the format `{name}`; name one of them",
+                    other.plugin.path().display(),
+                    plugin.path().display()
+                ),
+            )),
+            None => {
+                self.add(plugin);
+                Ok(())
+            }
+        }
+    }
+
+    /// One that was found takes no other's place.
+    fn found(&mut self, plugin: Plugin) {
+        let name = plugin.info().name.clone();
+        let path = plugin.path().display().to_string();
+        match self.plugins.iter().find(|p| p.plugin.info().name == name) {
+            Some(same) if same.plugin.path() == plugin.path() => {}
+            Some(other) => self.left_out.push(format!(
+                "plugin {path} is left out: {} reads the format `{name}` as well and came first",
+                other.plugin.path().display()
+            )),
+            None if self.registry.by_name(&name).is_ok() => self.left_out.push(format!(
+                "plugin {path} is left out: the format `{name}` is built in (naming {path} as a plugin puts it first)"
+            )),
+            None => self.add(plugin),
+        }
+    }
+
+    fn add(&mut self, plugin: Plugin) {
+        let replaces = self.registry.by_name(&plugin.info().name).is_ok();
+        self.registry.add(Box::new(plugin.clone()));
+        self.plugins.push(LoadedPlugin { plugin, replaces });
+    }
+}

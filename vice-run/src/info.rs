@@ -1,0 +1,134 @@
+//! What a data set holds, in words.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use vice_core::dataset::{Dataset, Floor};
+use vice_core::suspicion::Suspicions;
+use vice_core::time::{Span, Stamp};
+
+use crate::error::RunResult;
+use crate::text::printable;
+
+/// What a data set holds, or one of its cameras.
+///
+/// # Errors
+/// [`RunError`](crate::error::RunError) if what it lists cannot be read.
+pub fn describe(dataset: &dyn Dataset, camera: Option<&str>) -> RunResult<String> {
+    let mut text = String::new();
+    writeln!(text, "{} ({})", printable(dataset.name()), printable(dataset.format()))?;
+    writeln!(text, "cameras")?;
+    let mut first_frame = None;
+    for name in dataset.cameras().iter().filter(|n| camera.is_none_or(|c| c == n.as_str())) {
+        first_frame = first_frame.or(describe_camera(&mut text, dataset, name)?);
+    }
+    describe_streams(&mut text, dataset)?;
+    let imu = dataset.imu()?;
+    if let (Some(first), Some(last)) = (imu.first(), imu.last()) {
+        writeln!(text, "imu")?;
+        writeln!(text, "  {}", stretch(imu.len(), first.stamp, last.stamp))?;
+    }
+    if let Some(cloud) = dataset.cloud()? {
+        writeln!(text, "point cloud")?;
+        match &cloud.source {
+            vice_core::dataset::CloudSource::Ply(path) => writeln!(text, "  {}", path.display())?,
+            vice_core::dataset::CloudSource::Points(points) => writeln!(text, "  {} points", points.len())?,
+            _ => {}
+        }
+    }
+    if let Some(Ok(floor)) = first_frame.map(|stamp| dataset.floor(stamp)) {
+        writeln!(text, "floor")?;
+        let (frame, n, d) = match floor {
+            Floor::World(plane) => ("world", plane.normal(), plane.d_m()),
+            Floor::Body(plane) => ("body at the key frame", plane.normal(), plane.d_m()),
+            _ => return Ok(text),
+        };
+        writeln!(text, "  {:.4} x + {:.4} y + {:.4} z + {d:.4} m = 0 in the {frame}", n.x, n.y, n.z)?;
+    }
+    describe_suspicions(&mut text, dataset)?;
+    let mut sections: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for fact in dataset.facts() {
+        sections.entry(fact.section).or_default().push(fact.text);
+    }
+    for (section, lines) in sections {
+        writeln!(text, "{}", printable(&section))?;
+        for line in lines {
+            writeln!(text, "  {}", printable(&line))?;
+        }
+    }
+    Ok(text)
+}
+
+fn describe_camera(text: &mut String, dataset: &dyn Dataset, name: &str) -> RunResult<Option<Stamp>> {
+    let shown = printable(name);
+    match dataset.camera(name) {
+        Ok(camera) => {
+            let [fx, fy, cx, cy] = camera.fx_fy_cx_cy();
+            let model = camera.model();
+            writeln!(text, "  {shown}: {}x{}, {}", camera.width(), camera.height(), model.name())?;
+            writeln!(text, "    fx {fx} fy {fy} cx {cx} cy {cy}, distortion {:?}", model.coefficients())?;
+        }
+        Err(error) => writeln!(text, "  {shown}: no usable calibration: {}", printable(&error.to_string()))?,
+    }
+    let frames = dataset.frames(name)?;
+    let (Some(first), Some(last)) = (frames.first(), frames.last()) else {
+        writeln!(text, "    no frames")?;
+        return Ok(None);
+    };
+    writeln!(text, "    frames: {}", stretch(frames.len(), *first, *last))?;
+    match dataset.body_from_camera(name, *first) {
+        Ok(pose) => {
+            let (t, q) = (pose.translation(), pose.rotation());
+            writeln!(
+                text,
+                "    body_from_camera at the first frame: t [{:.4}, {:.4}, {:.4}] m, q wxyz [{:.5}, {:.5}, {:.5}, {:.5}]",
+                t.x, t.y, t.z, q.w, q.i, q.j, q.k
+            )?;
+        }
+        Err(error) => writeln!(text, "    body_from_camera unknown: {}", printable(&error.to_string()))?,
+    }
+    if dataset.has_depth(name) {
+        writeln!(text, "    depth images: yes")?;
+    }
+    Ok(Some(*first))
+}
+
+fn describe_streams(text: &mut String, dataset: &dyn Dataset) -> RunResult<()> {
+    writeln!(text, "pose streams")?;
+    for name in dataset.streams() {
+        let shown = printable(&name);
+        match dataset.trajectory(&name) {
+            Ok(t) => {
+                let extent = stretch(t.len(), t.start(), t.end());
+                writeln!(text, "  {shown}: {extent}, path {:.2} m", t.path_length_m())?;
+            }
+            Err(error) => writeln!(text, "  {shown}: cannot be read: {}", printable(&error.to_string()))?,
+        }
+    }
+    if dataset.streams().is_empty() {
+        writeln!(text, "  none")?;
+    }
+    Ok(())
+}
+
+/// What looked wrong while all this was read.
+fn describe_suspicions(text: &mut String, dataset: &dyn Dataset) -> RunResult<()> {
+    let suspicions: Suspicions = dataset.suspicions().into_iter().collect();
+    if !suspicions.is_empty() {
+        writeln!(text, "suspicions")?;
+    }
+    for suspicion in suspicions.iter() {
+        writeln!(text, "  {}", printable(&suspicion.line()))?;
+    }
+    Ok(())
+}
+
+/// Count, rate and range of stamps.
+fn stretch(count: usize, first: Stamp, last: Stamp) -> String {
+    let length: Span = last.since(first);
+    let rate = match length.as_secs_f64() {
+        s if s > 0.0 && count > 1 => format!(", {:.1} Hz on average", (count - 1) as f64 / s),
+        _ => String::new(),
+    };
+    format!("{count}{rate}, {first} to {last} ns ({:.2} s)", length.as_secs_f64())
+}

@@ -1,0 +1,140 @@
+//! Opening a recording: its format, the camera in use, and what the user overrides.
+
+use std::sync::Arc;
+
+use vice_core::camera::Camera;
+use vice_core::dataset::{Calibrated, Dataset, Floor, OpenOptions, Plane};
+use vice_core::frames::World;
+use vice_core::registry::Registry;
+use vice_core::time::{Span, Stamp};
+use vice_files::calibration::CalibrationFile;
+
+use crate::error::{RunError, RunResult};
+use crate::formats;
+use crate::request::DatasetSpec;
+
+/// A recording as it is used.
+#[derive(Clone)]
+pub struct Opened {
+    /// The data set, with what was overridden in place.
+    pub dataset: Arc<dyn Dataset>,
+    /// Name of the camera in use.
+    pub camera_name: String,
+    /// Its intrinsics.
+    pub camera: Camera,
+    /// Stamps of its frames.
+    pub frames: Arc<[Stamp]>,
+    /// The calibration file, where one was given.
+    pub calibration: Option<CalibrationFile>,
+}
+
+impl DatasetSpec {
+    /// Opens the recording with all formats, those of plugins among them.
+    ///
+    /// # Errors
+    /// [`RunError`] if no format reads it, what overrides it cannot be used, or the camera is not there.
+    pub fn open(&self) -> RunResult<Opened> {
+        // Small files first, so that a mistake in one costs nothing.
+        let calibration = self.calibration()?;
+        let floor = self.floor()?;
+        let dataset = self.open_raw(&formats::registry(&self.plugins)?)?;
+        self.calibrate(dataset, calibration, floor)
+    }
+
+    /// The recording by itself, with formats that were loaded before: no camera is chosen and nothing overridden.
+    ///
+    /// # Errors
+    /// [`RunError`] if no format reads it.
+    pub fn open_raw(&self, registry: &Registry) -> RunResult<Arc<dyn Dataset>> {
+        let options = OpenOptions { settings: self.set.clone() };
+        Ok(Arc::from(registry.open(&self.path, self.format.as_deref(), &options)?))
+    }
+
+    /// A data set that is open already, with the camera and the overrides of this request.
+    ///
+    /// # Errors
+    /// [`RunError`] if what overrides it cannot be used, or the camera is not there.
+    pub fn apply_to(&self, dataset: Arc<dyn Dataset>) -> RunResult<Opened> {
+        self.calibrate(dataset, self.calibration()?, self.floor()?)
+    }
+
+    fn calibrate(
+        &self,
+        dataset: Arc<dyn Dataset>,
+        calibration: Option<CalibrationFile>,
+        floor: Option<Floor>,
+    ) -> RunResult<Opened> {
+        let name = self.camera_name(dataset.as_ref())?;
+        let mut calibrated = Calibrated::new(Arc::clone(&dataset));
+        if let Some(file) = &calibration {
+            check_calibrated(file, &name)?;
+            // The file may hold only extrinsics, or be all there is where the data set's own is broken.
+            if let Some(camera) = file.camera(&name, dataset.camera(&name).ok().as_ref())? {
+                calibrated = calibrated.with_camera(&name, camera);
+            }
+            if let Some(body_from_camera) = file.body_from_camera(&name) {
+                calibrated = calibrated.with_body_from_camera(&name, body_from_camera);
+            }
+        }
+        if let Some(floor) = floor {
+            calibrated = calibrated.with_floor(floor);
+        }
+        let camera = calibrated.camera(&name)?;
+        let frames = calibrated.frames(&name)?;
+        tracing::info!(
+            "{} ({}): camera {name} with {} frames",
+            dataset.name(),
+            dataset.format(),
+            frames.len()
+        );
+        Ok(Opened { dataset: Arc::new(calibrated), camera_name: name, camera, frames, calibration })
+    }
+
+    /// The name of the camera that was asked for, or the first.
+    ///
+    /// # Errors
+    /// [`RunError`] if there is no such camera, or none at all.
+    pub fn camera_name(&self, dataset: &dyn Dataset) -> RunResult<String> {
+        let names = dataset.cameras();
+        match &self.camera {
+            Some(name) if names.contains(name) => Ok(name.clone()),
+            Some(name) => {
+                let known = if names.is_empty() { "none".to_string() } else { names.join(", ") };
+                Err(RunError::usage("camera", format!("there is no camera {name}; there are {known}")))
+            }
+            None => names.into_iter().next().ok_or_else(|| {
+                RunError::missing(format!("{}: the data set has no camera", self.path.display()))
+            }),
+        }
+    }
+
+    fn calibration(&self) -> RunResult<Option<CalibrationFile>> {
+        Ok(self.calibration.as_ref().map(CalibrationFile::read).transpose()?)
+    }
+
+    fn floor(&self) -> RunResult<Option<Floor>> {
+        let Some([nx, ny, nz, d]) = self.floor_plane else { return Ok(None) };
+        let plane = Plane::<World>::new([nx, ny, nz], d)
+            .map_err(|e| RunError::usage("floor-plane", e.to_string()))?;
+        Ok(Some(Floor::World(plane)))
+    }
+}
+
+impl Opened {
+    /// Seconds that the calibration adds to the stamps of estimates, where it says so.
+    pub fn calibrated_time_offset(&self) -> Option<Span> {
+        self.calibration.as_ref()?.time_offset
+    }
+}
+
+/// A file that says nothing about the camera in use is a mistake, unless all it holds is a clock offset.
+fn check_calibrated(file: &CalibrationFile, camera: &str) -> RunResult<()> {
+    if file.cameras().is_empty() || file.cameras().contains_key(camera) {
+        return Ok(());
+    }
+    let known: Vec<&str> = file.cameras().keys().map(String::as_str).collect();
+    Err(RunError::usage(
+        "calibration",
+        format!("the file is of {}, the camera is {camera}; give its entry that name", known.join(", ")),
+    ))
+}

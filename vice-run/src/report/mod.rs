@@ -1,0 +1,27 @@
+//! Documents as text and pictures: the paper's table, CSV, LaTeX, plots, frames, and the page.
+
+pub mod comparison;
+pub mod csv;
+pub(crate) mod depth_picture;
+pub mod diagnosis_text;
+pub(crate) mod evo_zip;
+pub(crate) mod film_frame;
+pub(crate) mod flaw_units;
+pub(crate) mod font;
+pub mod frames;
+pub mod html;
+pub mod latex;
+pub(crate) mod marks;
+pub(crate) mod npy;
+pub(crate) mod numbers;
+pub(crate) mod overlay;
+pub(crate) mod plots;
+#[cfg(feature = "rerun")]
+pub mod rerun_log;
+pub(crate) mod rows;
+pub mod sample_lines;
+pub mod sensitivity_plot;
+pub mod sensitivity_text;
+pub mod table;
+#[cfg(test)]
+pub(crate) mod testing;

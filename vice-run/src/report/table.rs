@@ -1,0 +1,105 @@
+//! The table on the terminal, in the shape of the paper's, and what was left out.
+
+use crate::result::ResultDocument;
+
+use super::rows::{mean_and_deviation, pixels, rows, sizes};
+use crate::text::printable;
+
+/// The table, the pooled RMSE of each stream, and the skips.
+pub fn render(document: &ResultDocument) -> String {
+    let sizes = sizes(document);
+    let mut grid: Vec<Vec<String>> = Vec::new();
+    let mut head = vec!["estimate", "RMSE_3D m", "AOE rad", "ROE rad", "depth"]
+        .into_iter()
+        .map(String::from)
+        .collect::<Vec<_>>();
+    for column in ["ref", "est"] {
+        for size in &sizes {
+            head.push(format!("{column} {size}pt px"));
+        }
+    }
+    grid.push(head);
+    for row in rows(document) {
+        let three_d = row.trajectory.map(|t| [t.rmse_3d_m, t.aoe_rad, t.roe_rad]).unwrap_or_default();
+        let mut cells = vec![printable(row.stream)];
+        cells.extend(three_d.map(|v| v.map_or_else(not_available, |v| format!("{v:.3}"))));
+        cells.push(printable(row.depth));
+        for part in [row.reference, row.estimate] {
+            for size in &sizes {
+                cells.push(mean_and_deviation(part, *size, "±").unwrap_or_else(not_available));
+            }
+        }
+        grid.push(cells);
+    }
+    let mut text = heading(document);
+    text.push_str(&align(&grid));
+    for part in &document.trajectory {
+        if let Some(problem) = &part.problem {
+            text.push_str(&format!("no RMSE_3D of {}: {}\n", printable(&part.estimate), printable(problem)));
+        }
+    }
+    text.push('\n');
+    text.push_str(&pooled(document));
+    text
+}
+
+fn not_available() -> String {
+    "-".to_string()
+}
+
+fn heading(document: &ResultDocument) -> String {
+    let d = &document.dataset;
+    format!(
+        "{} ({}, {}): RMSE_2D in px, mean ± sd over subsets of the points; ref: the reference against the labels, est: the estimate against the labels\n\n",
+        printable(&d.name),
+        printable(&d.format),
+        printable(&d.camera)
+    )
+}
+
+fn pooled(document: &ResultDocument) -> String {
+    let mut grid =
+        vec![["stream", "role", "depth", "pooled px", "scored", "skipped"].map(String::from).to_vec()];
+    for part in &document.pixel {
+        let reasons: Vec<String> =
+            part.skips_by_reason().iter().map(|(r, n)| format!("{n} {}", printable(r))).collect();
+        let skipped = match reasons.is_empty() {
+            true => "0".to_string(),
+            false => format!("{} ({})", part.skipped.len(), reasons.join(", ")),
+        };
+        grid.push(vec![
+            printable(&part.stream),
+            format!("{:?}", part.role).to_lowercase(),
+            printable(&part.depth),
+            part.pooled_rmse_px.map_or_else(not_available, |v| pixels(v, 3)),
+            part.scored.to_string(),
+            skipped,
+        ]);
+    }
+    align(&grid)
+}
+
+/// Columns as wide as their widest cell, the first row underlined.
+pub fn align(grid: &[Vec<String>]) -> String {
+    let columns = grid.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |column: usize| {
+        grid.iter().filter_map(|r| r.get(column)).map(|c| c.chars().count()).max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let mut text = String::new();
+    for (i, row) in grid.iter().enumerate() {
+        let cells: Vec<String> = row
+            .iter()
+            .zip(&widths)
+            .map(|(cell, width)| format!("{cell}{}", " ".repeat(width - cell.chars().count())))
+            .collect();
+        text.push_str(cells.join("  ").trim_end());
+        text.push('\n');
+        if i == 0 {
+            let rule: Vec<String> = widths.iter().map(|w| "-".repeat(*w)).collect();
+            text.push_str(&rule.join("  "));
+            text.push('\n');
+        }
+    }
+    text
+}

@@ -1,0 +1,375 @@
+//! What is asked for, as plain data: a data set, labels, pose streams, depth and a protocol.
+//!
+//! A command line, a row of a batch, a call from Python and a result document all hold the same [`Request`]. Unknown
+//! fields are refused; what is left out has the default that is stated here. Files are named as they were given, so
+//! that a relative path means the folder in which the request is run.
+
+mod command_line;
+mod estimate;
+mod read;
+mod word;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use vice_core::error::ErrorKind;
+use vice_core::evaluate::{Observations, Window};
+use vice_core::metrics::align::Alignment;
+use vice_core::time::Span;
+use vice_detect::TagFamily;
+
+pub use estimate::{Anchor, EstimateFrame, EstimateSpec, IMU_EULER, ReferenceSpec};
+
+pub(crate) use word::{seconds, seconds_option};
+
+use crate::error::{RunError, RunResult};
+use crate::open::Opened;
+use crate::sources::DepthName;
+
+/// Everything that says what is evaluated, and how.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Request {
+    /// The recording.
+    pub dataset: DatasetSpec,
+    /// The labels.
+    #[serde(default)]
+    pub labels: LabelsSpec,
+    /// The part of the run that is looked at.
+    #[serde(default)]
+    pub protocol: Protocol,
+    /// The pose streams.
+    #[serde(default)]
+    pub streams: StreamsSpec,
+    /// The depth sources.
+    #[serde(default)]
+    pub depth: DepthSpec,
+    /// How it is scored.
+    #[serde(default)]
+    pub scoring: Scoring,
+}
+
+/// A recording, and what replaces parts of it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DatasetSpec {
+    /// Folder or file.
+    pub path: PathBuf,
+    /// Format; `None`: found by looking.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub format: Option<String>,
+    /// Settings of the format, by key.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub set: BTreeMap<String, String>,
+    /// Camera; `None`: the first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<String>,
+    /// Calibration file that overrides the data set's: TOML, or a Kalibr camchain.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<PathBuf>,
+    /// Floor plane `n·p + d = 0` in the world in place of the data set's: nx, ny, nz, d in metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub floor_plane: Option<[f64; 4]>,
+    /// Plugins beside those that are found by themselves.
+    #[serde(default, skip_serializing_if = "PluginsSpec::is_default")]
+    pub plugins: PluginsSpec,
+}
+
+/// Which plugins are loaded beside those in `VICE_PLUGIN_PATH` and the user's folder.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PluginsSpec {
+    /// Shared libraries; each goes before a built-in format of the same name.
+    #[serde(default)]
+    pub files: Vec<PathBuf>,
+    /// Load plugins even from files or folders that others may write to.
+    #[serde(default)]
+    pub allow_writable: bool,
+}
+
+impl PluginsSpec {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// The labels that are scored.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LabelsSpec {
+    /// CSV, JSON, CVAT's XML, or the authors' pickle.
+    pub file: PathBuf,
+    /// Only these points; empty: all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub points: Vec<String>,
+    /// Whose labels count.
+    #[serde(default)]
+    pub observations: Observations,
+}
+
+/// The part of a run that is looked at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Protocol {
+    /// Keep the frame nearest to each tick of this rate (Hz), and every key frame; `None`: every labelled frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fps: Option<f64>,
+    /// Seconds after the camera's first frame.
+    #[serde(default, rename = "start_s", with = "seconds")]
+    pub start: Span,
+    /// Seconds from there; `None`: to the end.
+    #[serde(
+        default,
+        rename = "duration_s",
+        with = "seconds_option",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub duration: Option<Span>,
+}
+
+/// Which pose streams are evaluated, and how their poses are read.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StreamsSpec {
+    /// What is evaluated.
+    #[serde(default)]
+    pub estimates: Vec<EstimateSpec>,
+    /// What it is compared with.
+    #[serde(default)]
+    pub reference: ReferenceSpec,
+    /// Whose poses the estimates give.
+    #[serde(default)]
+    pub estimate_frame: EstimateFrame,
+    /// Times of KITTI files; `None`: times.txt beside each.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub times: Option<PathBuf>,
+    /// Seconds added to the stamps of the estimates; `None`: what the calibration says, or nothing.
+    #[serde(
+        default,
+        rename = "time_offset_s",
+        with = "seconds_option",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub time_offset: Option<Span>,
+    /// Widest gap between two poses that is interpolated, seconds.
+    #[serde(default = "default_max_gap", rename = "max_gap_s", with = "seconds")]
+    pub max_gap: Span,
+    /// What places the camera in the world for depth; `None`: the reference where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub anchor: Option<Anchor>,
+    /// Pose `world_from_body` of the anchoring estimate at the first key frame: x, y, z in metres, then the quaternion
+    /// x, y, z, w.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub initial_pose: Option<[f64; 7]>,
+}
+
+/// Widest gap that is interpolated where nothing else is said.
+pub const DEFAULT_MAX_GAP: Span = Span::from_millis(100);
+
+const fn default_max_gap() -> Span {
+    DEFAULT_MAX_GAP
+}
+
+impl Default for StreamsSpec {
+    fn default() -> Self {
+        Self {
+            estimates: Vec::new(),
+            reference: ReferenceSpec::default(),
+            estimate_frame: EstimateFrame::default(),
+            times: None,
+            time_offset: None,
+            max_gap: DEFAULT_MAX_GAP,
+            anchor: None,
+            initial_pose: None,
+        }
+    }
+}
+
+/// Which depth sources are asked, and how they work.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DepthSpec {
+    /// The sources; empty: the floor.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sources: Vec<DepthName>,
+    /// Whether the Z-map leaves out cloud points that are hidden; `None`: yes. Off reproduces the paper.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zmap_occlusion: Option<bool>,
+    /// Thin the cloud to one point for each cube of this size, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cloud_voxel_m: Option<f64>,
+    /// Nearest and furthest reading of a depth camera that is trusted, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zcam_range_m: Option<[f64; 2]>,
+    /// Side of the tags: the dark border's outside, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tag_size_m: Option<f64>,
+    /// Family of the tags; `None`: 36h11.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tag_family: Option<TagFamily>,
+}
+
+/// How it is scored.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scoring {
+    /// Numbers of points whose subsets are averaged over; empty: those up to 3 that exist.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub subsets: Vec<usize>,
+    /// Alignment of the trajectory errors.
+    #[serde(default)]
+    pub align: Alignment,
+}
+
+impl Request {
+    /// A request for estimates of a data set, with the defaults for all else.
+    pub fn new(
+        dataset: impl Into<PathBuf>,
+        labels: impl Into<PathBuf>,
+        estimates: impl IntoIterator<Item = EstimateSpec>,
+    ) -> Self {
+        Self {
+            dataset: DatasetSpec { path: dataset.into(), ..DatasetSpec::default() },
+            labels: LabelsSpec { file: labels.into(), ..LabelsSpec::default() },
+            streams: StreamsSpec { estimates: estimates.into_iter().collect(), ..StreamsSpec::default() },
+            ..Self::default()
+        }
+    }
+
+    /// Reads a request, or that of a result document.
+    ///
+    /// # Errors
+    /// [`vice_core::error::DataError`] with the path and line if the file cannot be read or is neither.
+    pub fn read(path: impl AsRef<Path>) -> RunResult<Self> {
+        Ok(read::read(path.as_ref())?)
+    }
+
+    /// The command line of `vice evaluate` that asks for the same.
+    pub fn command_line(&self) -> String {
+        command_line::of(self)
+    }
+
+    /// The frames and labels that take part.
+    pub fn window(&self) -> Window {
+        self.protocol.window(self.labels.observations)
+    }
+
+    /// All that is read, and so must not be written over: files, and the whole data set.
+    pub fn inputs(&self) -> Vec<PathBuf> {
+        let mut files = vec![self.dataset.path.clone(), self.labels.file.clone()];
+        files.extend(self.streams.estimates.iter().filter_map(|e| e.path().map(Path::to_path_buf)));
+        if let ReferenceSpec::Named(EstimateSpec::Named(name)) = &self.streams.reference {
+            files.push(PathBuf::from(name));
+        }
+        files.extend(self.streams.times.iter().chain(&self.dataset.calibration).cloned());
+        if let EstimateFrame::File(file) = &self.streams.estimate_frame {
+            files.push(file.clone());
+        }
+        files
+    }
+
+    /// Refuses what contradicts itself or would do nothing, whatever the data.
+    ///
+    /// # Errors
+    /// [`RunError`] of the kind usage.
+    pub fn check(&self) -> RunResult<()> {
+        self.protocol.check()?;
+        self.depth.check(&[])?;
+        if self.streams.max_gap < Span::ZERO {
+            return Err(RunError::usage("max-gap", "must not be negative"));
+        }
+        if let Some(zero) = self.scoring.subsets.iter().find(|n| **n == 0) {
+            return Err(RunError::usage("subsets", format!("{zero} points make no subset")));
+        }
+        Ok(())
+    }
+}
+
+impl Protocol {
+    /// The window of a run, for some labels.
+    pub const fn window(&self, observations: Observations) -> Window {
+        Window { fps: self.fps, start: self.start, duration: self.duration, observations }
+    }
+
+    /// Indices of the frames that are looked at, where nothing is scored.
+    ///
+    /// # Errors
+    /// [`RunError`] of the kind usage if there are none.
+    pub fn frames(&self, opened: &Opened) -> RunResult<Vec<usize>> {
+        self.check()?;
+        let frames = self.window(Observations::default()).frames(&opened.frames);
+        if frames.is_empty() {
+            return Err(RunError::new(
+                ErrorKind::Usage,
+                format!(
+                    "no frame lies in the part of the run that was asked for; camera {} has {}",
+                    opened.camera_name,
+                    opened.frames.len()
+                ),
+            )
+            .advise("see `start` and `duration`"));
+        }
+        Ok(frames)
+    }
+
+    /// Refuses negative times and rates.
+    ///
+    /// # Errors
+    /// [`RunError`] of the kind usage.
+    pub fn check(&self) -> RunResult<()> {
+        if self.fps.is_some_and(|fps| !(fps > 0.0 && fps.is_finite())) {
+            return Err(RunError::usage("fps", "must be a number above zero"));
+        }
+        for (field, span) in [("start", Some(self.start)), ("duration", self.duration)] {
+            if span.is_some_and(|s| s < Span::ZERO) {
+                return Err(RunError::usage(field, "must not be negative"));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl DepthSpec {
+    /// The sources that are asked: the floor where none is named.
+    pub fn names(&self) -> Vec<DepthName> {
+        if self.sources.is_empty() { vec![DepthName::Floor] } else { self.sources.clone() }
+    }
+
+    /// Refuses settings of sources that nobody asks for, here or in `also`.
+    ///
+    /// # Errors
+    /// [`RunError`] of the kind usage.
+    pub fn check(&self, also: &[DepthName]) -> RunResult<()> {
+        use DepthName::{Tag, ZCam, ZMap};
+        let settings = [
+            ("zmap-occlusion", self.zmap_occlusion.is_some(), ZMap),
+            ("cloud-voxel", self.cloud_voxel_m.is_some(), ZMap),
+            ("zcam-range", self.zcam_range_m.is_some(), ZCam),
+            ("tag-size", self.tag_size_m.is_some(), Tag),
+            ("tag-family", self.tag_family.is_some(), Tag),
+        ];
+        let names = self.names();
+        for (field, given, source) in settings {
+            if given && !names.contains(&source) && !also.contains(&source) {
+                let asked: Vec<&str> = names.iter().map(|n| n.name()).collect();
+                return Err(RunError::usage(
+                    field,
+                    format!(
+                        "is of the depth source {}, and only {} is asked",
+                        source.name(),
+                        asked.join(", ")
+                    ),
+                )
+                .advise(format!("add {} to `depth`, or leave it out", source.name())));
+            }
+        }
+        if let Some([near, far]) = self.zcam_range_m.filter(|[near, far]| !(0.0 <= *near && near < far)) {
+            return Err(RunError::usage("zcam-range", format!("{near} to {far} m holds no depth")));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,27 @@
+//! Requests from files: as they are, or out of a result document.
+
+use std::path::Path;
+
+use vice_core::error::{DataError, DataResult, ErrorKind};
+
+use super::Request;
+
+pub(super) fn read(path: &Path) -> DataResult<Request> {
+    let text = crate::result::read_bytes(path)?;
+    parse(&text).map_err(|e| e.at(path))
+}
+
+fn parse(text: &[u8]) -> DataResult<Request> {
+    #[derive(serde::Deserialize)]
+    struct Head {
+        schema: Option<String>,
+    }
+    let at = |e: serde_json::Error, what: &str| {
+        DataError::of_kind(ErrorKind::Usage, format!("{what}: {e}")).line(e.line() as u64)
+    };
+    let head: Head = serde_json::from_slice(text).map_err(|e| at(e, "is no request: it is not JSON"))?;
+    match head.schema {
+        None => serde_json::from_slice(text).map_err(|e| at(e, "is a request with a mistake in it")),
+        Some(_) => crate::result::parse(text).map(|document| document.request),
+    }
+}

@@ -1,0 +1,87 @@
+//! The result document `vice.result/2`: what was asked for, what an evaluation found, and all that is needed to repeat
+//! and to plot it.
+//!
+//! Units stand in the names. A number that could not be had is null, never NaN.
+
+mod read;
+mod version_1;
+
+use serde::{Deserialize, Serialize};
+use vice_core::result::{DatasetPart, Evaluated, PathPart, PixelPart, TrajectoryPart};
+use vice_core::suspicion::Suspicions;
+
+pub use read::read;
+pub(crate) use read::{parse, read_bytes};
+
+use crate::request::Request;
+
+/// The schema's name and version.
+pub const SCHEMA: &str = "vice.result/2";
+
+/// The document.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResultDocument {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// Version of VICE that wrote it.
+    #[serde(default)]
+    pub vice_version: String,
+    /// What was asked for: `vice evaluate --request` with this document asks for the same again.
+    pub request: Request,
+    /// What took the place of what the request leaves open.
+    pub used: Used,
+    /// What was evaluated.
+    pub dataset: DatasetPart,
+    /// Pixel errors, one entry for each pose stream and depth source.
+    pub pixel: Vec<PixelPart>,
+    /// Estimates against the reference, where there is one.
+    pub trajectory: Vec<TrajectoryPart>,
+    /// Where each stream went, for plots; empty where the samples were not asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub paths: Vec<PathPart>,
+    /// What looks wrong in the data but did not stop the evaluation.
+    #[serde(default, skip_serializing_if = "Suspicions::is_empty")]
+    pub suspicions: Suspicions,
+}
+
+/// What took the place of what a request leaves open.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Used {
+    /// Names of the points that take part.
+    pub points: Vec<String>,
+    /// The pose stream that places the camera for depth.
+    pub anchor: String,
+    /// Seconds added to the estimates' stamps.
+    pub time_offset_s: f64,
+    /// Alignment of the trajectory errors.
+    pub align: String,
+}
+
+impl ResultDocument {
+    /// The document of what was found.
+    pub fn new(request: Request, used: Used, found: Evaluated) -> Self {
+        Self {
+            schema: SCHEMA.to_string(),
+            vice_version: env!("CARGO_PKG_VERSION").to_string(),
+            request,
+            used,
+            dataset: found.dataset,
+            pixel: found.pixel,
+            trajectory: found.trajectory,
+            paths: found.paths,
+            suspicions: found.suspicions,
+        }
+    }
+
+    /// Leaves out the scored samples and what only plots need, as if they had not been asked for.
+    pub fn drop_samples(&mut self) {
+        self.paths.clear();
+        self.pixel.iter_mut().for_each(|p| p.samples.clear());
+        self.trajectory.iter_mut().for_each(|t| t.frames.clear());
+    }
+
+    /// Largest [`PixelPart::skipped_percent`] of all parts.
+    pub fn worst_skipped_percent(&self) -> f64 {
+        self.pixel.iter().map(PixelPart::skipped_percent).fold(0.0, f64::max)
+    }
+}

@@ -1,0 +1,147 @@
+//! Depth sources: the one list of them, and how each is made.
+
+use std::fmt;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use vice_core::dataset::{CloudRef, CloudSource, Dataset};
+use vice_core::depth::DepthSource;
+use vice_depth::{
+    Cloud, CloudOptions, FloorDepth, Mesh, MeshDepth, ZCamDepth, ZCamOptions, ZMapDepth, ZMapOptions,
+    load_cloud,
+};
+use vice_detect::{TagDepth, TagOptions};
+
+use crate::error::{RunError, RunResult};
+use crate::open::Opened;
+use crate::request::DepthSpec;
+
+/// A depth source by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum DepthName {
+    /// A plane: the floor.
+    Floor,
+    /// A point cloud, projected and interpolated.
+    ZMap,
+    /// A depth camera registered to the images.
+    ZCam,
+    /// The faces of a scan.
+    Mesh,
+    /// AprilTags of a known size.
+    Tag,
+}
+
+impl DepthName {
+    /// All sources.
+    pub const ALL: [Self; 5] = [Self::Floor, Self::ZMap, Self::ZCam, Self::Mesh, Self::Tag];
+
+    /// The name in requests, tables and documents.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Floor => "floor",
+            Self::ZMap => "zmap",
+            Self::ZCam => "zcam",
+            Self::Mesh => "mesh",
+            Self::Tag => "tag",
+        }
+    }
+}
+
+impl fmt::Display for DepthName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for DepthName {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let known = || Self::ALL.map(Self::name).join(", ");
+        let found = Self::ALL.into_iter().find(|n| n.name() == text);
+        found.ok_or_else(|| format!("unknown depth source {text}; known: {}", known()))
+    }
+}
+
+impl DepthSpec {
+    /// The sources that are asked for, in that order.
+    ///
+    /// # Errors
+    /// [`RunError`] if the data set has not what a source needs.
+    pub fn make_all(&self, opened: &Opened) -> RunResult<Vec<Box<dyn DepthSource>>> {
+        self.names().into_iter().map(|name| self.make(name, opened)).collect()
+    }
+
+    /// One source.
+    ///
+    /// # Errors
+    /// [`RunError`] if the data set has not what it needs.
+    pub fn make(&self, name: DepthName, opened: &Opened) -> RunResult<Box<dyn DepthSource>> {
+        let (dataset, camera) = (&opened.dataset, opened.camera_name.as_str());
+        match name {
+            DepthName::Floor => Ok(Box::new(FloorDepth::new())),
+            DepthName::ZMap => {
+                let (cloud, reference) = self.cloud(name, dataset.as_ref())?;
+                let occlusion = self.zmap_occlusion.unwrap_or(true);
+                let options = ZMapOptions { occlusion, ..ZMapOptions::default() };
+                Ok(Box::new(ZMapDepth::new(cloud, reference.world_from_cloud, options)))
+            }
+            DepthName::ZCam => {
+                let range_m = self.zcam_range_m.unwrap_or(ZCamOptions::default().range_m);
+                let options = ZCamOptions { range_m, ..ZCamOptions::default() };
+                Ok(Box::new(ZCamDepth::new(Arc::clone(dataset), camera, options)?))
+            }
+            DepthName::Mesh => {
+                let reference = cloud_of(name, dataset.as_ref())?;
+                let CloudSource::Ply(path) = &reference.source else {
+                    return Err(RunError::missing(format!(
+                        "{}: the depth source mesh needs a PLY with faces",
+                        dataset.name()
+                    )));
+                };
+                Ok(Box::new(MeshDepth::new(Arc::new(Mesh::read_ply(path)?), reference.world_from_cloud)))
+            }
+            DepthName::Tag => {
+                let size_m = self.tag_size_m.ok_or_else(|| {
+                    RunError::usage("depth", "tag: how large the tags are is not known")
+                        .advise("give `tag-size`")
+                })?;
+                let options = TagOptions { family: self.tag_family.unwrap_or_default(), border: None };
+                Ok(Box::new(TagDepth::new(Arc::clone(dataset), camera, options, size_m)?))
+            }
+        }
+    }
+
+    /// The data set's scan, read.
+    ///
+    /// # Errors
+    /// [`RunError`] if it has none for this source, or it cannot be read.
+    pub fn cloud(&self, source: DepthName, dataset: &dyn Dataset) -> RunResult<(Arc<Cloud>, CloudRef)> {
+        let reference = cloud_of(source, dataset)?;
+        let options = CloudOptions { voxel_m: self.cloud_voxel_m, ..CloudOptions::default() };
+        Ok((load_cloud(&reference, &options)?, reference))
+    }
+}
+
+fn cloud_of(source: DepthName, dataset: &dyn Dataset) -> RunResult<CloudRef> {
+    dataset.cloud()?.ok_or_else(|| {
+        RunError::missing(format!("{} has no point cloud for the depth source {source}", dataset.name()))
+            .advise("use `depth` floor")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_source_is_found_by_its_own_name() {
+        for name in DepthName::ALL {
+            assert_eq!(name.name().parse(), Ok(name));
+            assert_eq!(serde_json::to_string(&name).unwrap(), format!("\"{name}\""));
+        }
+        assert!("sonar".parse::<DepthName>().unwrap_err().contains("known: floor, zmap, zcam, mesh, tag"));
+    }
+}

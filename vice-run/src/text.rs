@@ -1,0 +1,38 @@
+//! Text from data made safe for where it is shown.
+
+/// Text from data made safe for a terminal: control characters would move its cursor or change its colours, and those
+/// that turn the direction of writing would show a name as another one.
+pub fn printable(text: &str) -> String {
+    let turns =
+        |c: char| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let breaks = |c: char| matches!(c, '\u{2028}' | '\u{2029}');
+    text.chars().map(|c| if c.is_control() || turns(c) || breaks(c) { ' ' } else { c }).collect()
+}
+
+/// A word of a command line for a POSIX shell.
+pub fn shell_word(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "_-./,:=+@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_string()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_cannot_move_the_cursor_or_turn_the_writing() {
+        assert_eq!(printable("a\u{1b}[31mb"), "a [31mb");
+        assert_eq!(printable("gpj.\u{202e}txt\u{2028}"), "gpj. txt ");
+    }
+
+    #[test]
+    fn a_word_stays_one_word() {
+        assert_eq!(shell_word("a/b-c.csv"), "a/b-c.csv");
+        assert_eq!(shell_word("it's $(x)"), "'it'\\''s $(x)'");
+        assert_eq!(shell_word(""), "''");
+    }
+}
