@@ -205,6 +205,7 @@ mod tests {
             by_distance: vec![],
             scored: errors.len() as u64,
             skipped: vec![],
+            depth_doubts: vec![],
             keyframes: [("a", 0), ("a", 10), ("b", 0), ("b", 10)].map(keyframe).to_vec(),
             samples: errors.iter().map(sample).collect(),
         }

@@ -2,8 +2,10 @@
 //!
 //! Units stand in the names. A number that could not be had is null, never NaN.
 
+mod depth_doubt;
 mod held;
 
+pub use depth_doubt::{DepthDoubt, DepthDoubtReason};
 pub use held::{AsideReason, Figure, HeldPart, SetAside, WindowPart};
 
 use std::collections::BTreeMap;
@@ -95,6 +97,9 @@ pub struct PixelPart {
     pub skipped: Vec<Skip>,
     /// Key frames that were used, with their depth.
     pub keyframes: Vec<KeyframePart>,
+    /// Key frames whose depth is doubtful, and why.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub depth_doubts: Vec<DepthDoubt>,
     /// The scored samples; empty where they were not asked for.
     pub samples: Vec<Sample>,
 }
@@ -184,6 +189,22 @@ pub struct TrajectoryPart {
     /// The errors over time, for plots; empty where the samples were not asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub frames: Vec<FrameError>,
+    /// The error of the motion since each key frame, for plots; empty where the samples were not asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub since_keyframe: Vec<MotionError>,
+}
+
+/// By how much the estimate's motion from a key frame to a labelled frame is off. No alignment enters.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MotionError {
+    /// The key frame.
+    pub keyframe_ns: Stamp,
+    /// The labelled frame.
+    pub timestamp_ns: Stamp,
+    /// Distance between where the two motions lead to, metres.
+    pub position_m: f64,
+    /// Angle between the two motions' rotations, radians.
+    pub angle_rad: f64,
 }
 
 /// The error of an estimate at a time, after alignment.
@@ -228,12 +249,20 @@ impl Evaluated {
     pub fn drop_samples(&mut self) {
         self.paths.clear();
         self.pixel.iter_mut().for_each(|p| p.samples.clear());
-        self.trajectory.iter_mut().for_each(|t| t.frames.clear());
+        self.trajectory.iter_mut().for_each(TrajectoryPart::drop_plots);
     }
 
     /// Largest [`PixelPart::skipped_percent`] of all parts.
     pub fn worst_skipped_percent(&self) -> f64 {
         self.pixel.iter().map(PixelPart::skipped_percent).fold(0.0, f64::max)
+    }
+}
+
+impl TrajectoryPart {
+    /// Leaves out what only plots need.
+    pub fn drop_plots(&mut self) {
+        self.frames.clear();
+        self.since_keyframe.clear();
     }
 }
 

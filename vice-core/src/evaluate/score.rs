@@ -39,23 +39,13 @@ const POINTS_AT_A_TIME: usize = 32;
 /// Takes the samples of one point.
 pub(super) type TakePoint<'a> = &'a mut dyn FnMut(&[Sample]) -> std::io::Result<()>;
 
-/// Scores all points. Their samples go to `sink` where there is one, in the order of the points. With `carries` the
-/// residuals are kept by segment, in a few bytes each.
+/// Scores all points. Their samples go to `sink` where there is one, in the order of the points.
 ///
 /// # Errors
 /// Those of the sink.
-pub(super) fn score(
-    evaluation: &Evaluation<'_>,
-    cameras: &[Option<BodyFromCamera>],
-    poses: &PosesAtFrames,
-    depths: &DepthTable,
-    carries: bool,
-    mut sink: Option<TakePoint<'_>>,
-) -> std::io::Result<Scored> {
-    let keep_samples = evaluation.keep_samples || sink.is_some();
-    let scorer = Scorer { evaluation, cameras, poses, depths, keep_samples, carries };
+pub(super) fn score(scorer: &Scorer<'_>, mut sink: Option<TakePoint<'_>>) -> std::io::Result<Scored> {
     let mut all = Scored::default();
-    for (chunk, some) in evaluation.selection.points.chunks(POINTS_AT_A_TIME).enumerate() {
+    for (chunk, some) in scorer.evaluation.selection.points.chunks(POINTS_AT_A_TIME).enumerate() {
         let first = chunk * POINTS_AT_A_TIME;
         let one = |(place, point): (usize, &SelectedPoint<'_>)| scorer.point(first + place, point);
         let points: Vec<ScoredPoint> = some.par_iter().enumerate().map(one).collect();
@@ -73,13 +63,16 @@ pub(super) fn score(
     Ok(all)
 }
 
-struct Scorer<'a> {
-    evaluation: &'a Evaluation<'a>,
-    cameras: &'a [Option<BodyFromCamera>],
-    poses: &'a PosesAtFrames,
-    depths: &'a DepthTable,
-    keep_samples: bool,
-    carries: bool,
+/// What one stream with one depth source is scored with.
+pub(super) struct Scorer<'a> {
+    pub(super) evaluation: &'a Evaluation<'a>,
+    pub(super) cameras: &'a [Option<BodyFromCamera>],
+    pub(super) poses: &'a PosesAtFrames,
+    pub(super) depths: &'a DepthTable,
+    /// Whether samples are listed, or handed on.
+    pub(super) keep_samples: bool,
+    /// Whether residuals are kept by segment, in a few bytes each.
+    pub(super) carries: bool,
 }
 
 impl Scorer<'_> {
@@ -185,7 +178,7 @@ impl Scorer<'_> {
         u32::try_from(position(&self.evaluation.selection.frames, frame)).unwrap_or(u32::MAX)
     }
 
-    fn world_from_camera(&self, frame: usize) -> Result<WorldFromCamera, SkipReason> {
+    pub(super) fn world_from_camera(&self, frame: usize) -> Result<WorldFromCamera, SkipReason> {
         let at = position(&self.evaluation.selection.frames, frame);
         let world_from_body = self.poses[at].map_err(SkipReason::of_frame)?;
         let body_from_camera = self.cameras[at].ok_or(SkipReason::NoExtrinsics)?;

@@ -52,7 +52,9 @@ impl Observations {
     /// Why a label does not count, as a sample and as a key frame; `None` where it does.
     fn leaves_out(self, observation: &Observation) -> Option<(SkipReason, SkipReason)> {
         match self {
-            Self::Certain if observation.uncertain => Some((SkipReason::Uncertain, SkipReason::KeyframeUncertain)),
+            Self::Certain if observation.uncertain => {
+                Some((SkipReason::Uncertain, SkipReason::KeyframeUncertain))
+            }
             Self::Manual if observation.source != ObservationSource::Manual => {
                 Some((SkipReason::NotManual, SkipReason::KeyframeNotManual))
             }
@@ -179,7 +181,8 @@ impl<'a> Selection<'a> {
             for segment in point.segments() {
                 let keyframe = finder.find(segment.keyframe.stamp);
                 at_a_frame |= keyframe.is_some();
-                let keyframe_left_out = window.observations.leaves_out(segment.keyframe).map(|(_, reason)| reason);
+                let keyframe_left_out =
+                    window.observations.leaves_out(segment.keyframe).map(|(_, reason)| reason);
                 let mut samples = Vec::new();
                 for observation in segment.rest {
                     let frame = finder.find(observation.stamp);
@@ -210,7 +213,8 @@ impl<'a> Selection<'a> {
                     }
                     continue;
                 };
-                if samples.is_empty() && !(kept.covers(segment.keyframe.stamp) && keyframe_left_out.is_none()) {
+                if samples.is_empty() && !(kept.covers(segment.keyframe.stamp) && keyframe_left_out.is_none())
+                {
                     continue;
                 }
                 used[frame] = true;
