@@ -216,7 +216,7 @@ pub(crate) fn with_options(hint: &str) -> String {
 }
 
 /// Fields that have an option of the same name.
-const FIELDS: [&str; 31] = [
+const FIELDS: [&str; 32] = [
     "add",
     "align",
     "allow-writable-plugin",
@@ -227,6 +227,7 @@ const FIELDS: [&str; 31] = [
     "chessboard",
     "cloud-voxel",
     "depth",
+    "depth-check",
     "duration",
     "estimate",
     "estimate-as",

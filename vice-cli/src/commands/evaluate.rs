@@ -12,7 +12,7 @@ use vice_run::request::Scoring;
 use vice_run::result::ResultDocument;
 
 use super::report::shots;
-use crate::inputs::EvaluationArgs;
+use crate::inputs::{EvaluationArgs, on_off};
 use crate::outputs::Outputs;
 use crate::terminal::{self, Outcome, Verbosity, usage, with_progress};
 
@@ -41,9 +41,14 @@ struct ScoringArgs {
     /// Numbers of points whose subsets are averaged over [default: those up to 3 that exist].
     #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..), conflicts_with = "request")]
     subsets: Vec<u16>,
-    /// Alignment of the trajectory errors: none, first-pose, yaw, se3, sim3.
-    #[arg(long, value_name = "HOW", default_value = "se3", conflicts_with = "request")]
-    align: Alignment,
+    /// Alignment of the trajectory errors: none, first-pose, yaw, se3, sim3 [default: se3, and first-pose for imu-euler,
+    /// which starts in the reference's own state].
+    #[arg(long, value_name = "HOW", conflicts_with = "request")]
+    align: Option<Alignment>,
+    /// Whether depths at key frames are compared with the recording's depth camera or scan, where these are not asked for
+    /// themselves [default: on].
+    #[arg(long, value_name = "on|off", action = clap::ArgAction::Set, value_parser = on_off, conflicts_with = "request")]
+    depth_check: Option<bool>,
     /// Exit with 3 if more labels than this could not be scored, percent. What an estimate carries behind the camera is warned of instead.
     #[arg(long, value_name = "PERCENT", default_value = "10", value_parser = percent)]
     max_skipped: f64,
@@ -95,7 +100,8 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         return Err(usage("--rrd: this vice was built without Rerun; build it with `--features rerun`"));
     }
     let subsets = args.scoring.subsets.iter().map(|n| usize::from(*n)).collect();
-    let request = args.evaluation.request(Scoring { subsets, align: args.scoring.align })?;
+    let mut request = args.evaluation.request(Scoring { subsets, align: args.scoring.align })?;
+    request.depth.compare = args.scoring.depth_check.or(request.depth.compare);
     let outputs = Outputs::new(
         &[&files.json, &files.csv, &files.latex, &files.report, &files.rrd, &samples],
         &request.inputs(),

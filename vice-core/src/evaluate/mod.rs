@@ -90,7 +90,7 @@ pub enum EvaluateError {
     #[error("no key frame is manual, so that no manual label can be scored by itself (see `observations`)")]
     NoManualKeyframe,
     /// Every key frame is flagged as uncertain.
-    #[error("every key frame is flagged as uncertain, so that no label can be scored (see `observations`)")]
+    #[error("every key frame is flagged as uncertain, so that no label can be scored")]
     NoCertainKeyframe,
     /// More points are asked for than there are.
     #[error("subsets of {asked} points were asked for, but there are {points} points")]

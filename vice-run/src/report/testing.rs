@@ -52,6 +52,7 @@ pub(crate) fn part(stream: &str, samples: &[Sample]) -> PixelPart {
         scored: samples.len() as u64,
         skipped: vec![],
         keyframes: vec![],
+        depth_doubts: vec![],
         samples: samples.to_vec(),
     }
 }

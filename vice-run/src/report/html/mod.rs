@@ -170,7 +170,7 @@ fn cards(document: &ResultDocument) -> Markup {
 fn data(run: &Run) -> RunResult<String> {
     let mut document = run.document.clone();
     document.paths.clear();
-    document.trajectory.iter_mut().for_each(|t| t.frames.clear());
+    document.trajectory.iter_mut().for_each(vice_core::result::TrajectoryPart::drop_plots);
     for part in &mut document.pixel {
         part.samples.clear();
         part.keyframes.clear();
