@@ -20,6 +20,8 @@ pub(crate) enum Outcome {
     Done,
     /// Done, but more labels than allowed could not be scored.
     TooManySkips,
+    /// Done, but a limit that was required is broken.
+    RequirementBroken,
 }
 
 /// Options that do not fit together or the data: exit code 2.
