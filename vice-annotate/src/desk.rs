@@ -7,8 +7,8 @@ use vice_core::camera::Camera;
 use vice_core::dataset::Dataset;
 use vice_core::time::Stamp;
 use vice_run::error::RunResult;
+use vice_run::request::DepthName;
 use vice_run::request::Request;
-use vice_run::sources::DepthName;
 
 use crate::estimates::Estimates;
 use crate::scene::SceneEstimates;

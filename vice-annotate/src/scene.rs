@@ -16,8 +16,8 @@ use vice_core::time::Stamp;
 use vice_core::track::{lift, track};
 use vice_run::error::{RunError, RunResult};
 use vice_run::open::Opened;
+use vice_run::request::DepthName;
 use vice_run::request::{EstimateSpec, ReferenceSpec, Request};
-use vice_run::sources::DepthName;
 use vice_run::streams::LoadedStreams;
 
 use crate::estimates::{Dot, Estimates, ProjectedStream, Projections, SkipCount, StreamKind};

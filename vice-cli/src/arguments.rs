@@ -72,3 +72,42 @@ pub(crate) enum Command {
     /// Print completions for a shell.
     Completions(commands::completions::Args),
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inputs::ASKED;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_holds_together() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_request_from_a_file_stands_alone() {
+        let parse = |words: &[&str]| Cli::try_parse_from(words).map(|_| ()).map_err(|e| e.kind());
+        let alone = ["vice", "evaluate", "--request", "r.json", "--json", "out.json"];
+        assert_eq!(parse(&alone), Ok(()));
+        for extra in
+            [&["run"][..], &["--fps", "10"], &["--depth", "zmap"], &["--align", "yaw"], &["--max-gap", "1"]]
+        {
+            let words = [&alone[..], extra].concat();
+            assert_eq!(parse(&words), Err(clap::error::ErrorKind::ArgumentConflict), "{extra:?}");
+        }
+        let missing = parse(&["vice", "evaluate", "run", "--labels", "l.csv"]);
+        assert_eq!(missing, Err(clap::error::ErrorKind::MissingRequiredArgument));
+    }
+
+    #[test]
+    fn all_that_says_what_is_evaluated_is_known_to_a_request() {
+        let command = Cli::command();
+        let evaluate = command.find_subcommand("evaluate").unwrap();
+        let asks = ["Data set", "Labels", "Pose streams", "Depth"];
+        for argument in evaluate.get_arguments() {
+            if argument.get_help_heading().is_some_and(|h| asks.contains(&h)) {
+                assert!(ASKED.contains(&argument.get_id().as_str()), "{}", argument.get_id());
+            }
+        }
+    }
+}

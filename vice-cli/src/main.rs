@@ -9,7 +9,7 @@ mod terminal;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 
 use arguments::{Cli, Command};
 use terminal::Outcome;
@@ -40,7 +40,7 @@ fn main() -> ExitCode {
         Command::Overlay(args) => commands::overlay::run(args, verbosity),
         Command::Compare(args) => commands::compare::run(args),
         Command::Bench(args) => commands::bench::run(args, verbosity),
-        Command::Completions(args) => commands::completions::run(args),
+        Command::Completions(args) => commands::completions::run(args, Cli::command()),
     };
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

@@ -169,8 +169,8 @@ pub(crate) fn told(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for cause in error.chain() {
         let text = one(cause);
-        // Transparent wrappers repeat what they wrap.
-        if !line.ends_with(&text) {
+        // Wrappers repeat what they wrap, with a place before or a hint behind it.
+        if !line.contains(&text) {
             line = if line.is_empty() { text } else { format!("{line}: {text}") };
         }
     }

@@ -62,6 +62,11 @@ impl DataError {
         Self { kind, ..Self::new(problem) }
     }
 
+    /// What another error says, which stays its cause: a place or a hint can be added to it.
+    pub fn of(source: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self::new(source.to_string()).because(source)
+    }
+
     /// What kind of thing is wrong.
     pub const fn kind(&self) -> ErrorKind {
         self.kind
@@ -158,8 +163,8 @@ pub fn one_line(error: &dyn std::error::Error) -> String {
     let mut cause = error.source();
     while let Some(error) = cause {
         let text = error.to_string();
-        // Transparent wrappers repeat what they wrap.
-        if !line.ends_with(&text) {
+        // Wrappers repeat what they wrap, with a place before or a hint behind it.
+        if !line.contains(&text) {
             line.push_str(": ");
             line.push_str(&text);
         }
@@ -179,6 +184,9 @@ mod tests {
         assert_eq!(one_line(&error), "a.bag: cannot be read: disk on fire");
         let twice = DataError::new("cannot be read: disk on fire").because(DataError::new("disk on fire"));
         assert_eq!(one_line(&twice), "cannot be read: disk on fire");
+        let wrapped = DataError::of(std::io::Error::other("disk on fire")).at("a.bag").hint("call for help");
+        assert_eq!(one_line(&wrapped), "a.bag: disk on fire (call for help)");
+        assert!(std::error::Error::source(&wrapped).is_some_and(|s| s.is::<std::io::Error>()));
     }
 
     #[test]

@@ -10,6 +10,7 @@
 #![forbid(unsafe_code)]
 
 pub mod camera;
+pub mod conventions;
 pub mod dataset;
 pub mod depth;
 pub mod depth_doubt;

@@ -23,9 +23,9 @@ use crate::report::html::{IMAGE_BUDGET_BYTES, Run, Section, render};
 use crate::report::numbers::{first_and_last, mean};
 use crate::report::overlay::{Canvas, Colour, ESTIMATE_GREEN, ESTIMATE_YELLOW, LABEL_BLUE};
 use crate::report::table;
+use crate::request::DepthName;
 use crate::request::{DEFAULT_MAX_GAP, EstimateSpec, Request};
 use crate::result::{ResultDocument, Used};
-use crate::sources::DepthName;
 
 /// The estimates that are shown, the colours of their dots, and what is wrong with them.
 const ESTIMATES: [(&str, Colour); 3] =

@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 use vice_depth::{FloorFit, FloorFitOptions, fit_floor_to_cloud, fit_floor_to_depth_image};
 
 use crate::error::{RunError, RunResult};
+use crate::request::DepthName;
 use crate::request::DepthSpec;
 use crate::scene::Scene;
-use crate::sources::DepthName;
 
 /// A plane with less of the points than this is worth a warning.
 const SMALL_SHARE: f64 = 0.05;

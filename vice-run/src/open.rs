@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use vice_core::camera::Camera;
 use vice_core::dataset::{Calibrated, Dataset, Floor, OpenOptions, Plane};
+use vice_core::error::ErrorKind;
+use vice_core::evaluate::Observations;
 use vice_core::frames::World;
 use vice_core::registry::Registry;
 use vice_core::time::{Span, Stamp};
@@ -11,7 +13,7 @@ use vice_files::calibration::CalibrationFile;
 
 use crate::error::{RunError, RunResult};
 use crate::formats;
-use crate::request::DatasetSpec;
+use crate::request::{DatasetSpec, Protocol};
 
 /// A recording as it is used.
 #[derive(Clone)]
@@ -117,6 +119,29 @@ impl DatasetSpec {
         let plane = Plane::<World>::new([nx, ny, nz], d)
             .map_err(|e| RunError::usage("floor-plane", e.to_string()))?;
         Ok(Some(Floor::World(plane)))
+    }
+}
+
+impl Protocol {
+    /// Indices of the frames that are looked at, where nothing is scored.
+    ///
+    /// # Errors
+    /// [`RunError`] of the kind usage if there are none.
+    pub fn frames(&self, opened: &Opened) -> RunResult<Vec<usize>> {
+        self.check()?;
+        let frames = self.window(Observations::default()).frames(&opened.frames);
+        if frames.is_empty() {
+            return Err(RunError::new(
+                ErrorKind::Usage,
+                format!(
+                    "no frame lies in the part of the run that was asked for; camera {} has {}",
+                    opened.camera_name,
+                    opened.frames.len()
+                ),
+            )
+            .advise("see `start` and `duration`"));
+        }
+        Ok(frames)
     }
 }
 

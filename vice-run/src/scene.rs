@@ -59,7 +59,7 @@ impl Scene {
     /// The frame that a text names: an index, or the exact stamp in nanoseconds.
     ///
     /// # Errors
-    /// [`RunError`] of the kind usage with the nearest frame, if there is none.
+    /// [`RunError`] with the nearest frame, if there is none.
     pub fn frame_at(&self, text: &str) -> RunResult<usize> {
         let frames = &self.opened.frames;
         let number: i64 = text
@@ -76,14 +76,12 @@ impl Scene {
                 .filter_map(|i| frames.get(i))
                 .min_by_key(|s| s.since(stamp).abs());
             let nearest = nearest.map_or_else(String::new, |s| format!("; the nearest frame is at {s} ns"));
-            RunError::usage(
-                "at",
-                format!(
-                    "camera {} has {} frames and none at {stamp} ns{nearest}",
-                    self.opened.camera_name,
-                    frames.len()
-                ),
-            )
+            RunError::missing(format!(
+                "camera {} has {} frames and none at {stamp} ns{nearest}",
+                self.opened.camera_name,
+                frames.len()
+            ))
+            .of("at")
         })
     }
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use nalgebra::Vector3;
+use vice_core::conventions::{Convention, Given, cure};
 use vice_core::dataset::{Dataset, GROUND_TRUTH};
 use vice_core::depth::DepthSource;
 use vice_core::diagnose::InertialRun;
@@ -171,7 +172,7 @@ impl Loader<'_> {
 
     fn estimate(&mut self, spec: &EstimateSpec) -> RunResult<Trajectory> {
         let given = self.as_given(spec, "estimate")?;
-        let trajectory = self.to_body(given)?;
+        let trajectory = self.to_body(self.mended(given)?)?;
         trajectory
             .shifted(self.time_offset)
             .map_err(|e| RunError::usage("time-offset", format!("moves {spec} out of time")).because(e))
@@ -201,6 +202,18 @@ impl Loader<'_> {
             self.formats.insert("kitti");
         }
         Ok(read.trajectory)
+    }
+
+    /// Poses of another convention as those that were meant.
+    fn mended(&self, trajectory: Trajectory) -> RunResult<Trajectory> {
+        if self.spec.estimate_as.is_empty() {
+            return Ok(trajectory);
+        }
+        let camera = self.opened.camera_name.as_str();
+        let extrinsics = |stamp| self.dataset().body_from_camera(camera, stamp).ok();
+        let given =
+            Given { body_from_camera: Some(&extrinsics), first_frame: self.opened.frames.first().copied() };
+        cure(&self.spec.estimate_as, &trajectory, given).map_err(|e| RunError::from(e).of("estimate-as"))
     }
 
     /// Poses of a camera or another frame as poses of the body. Said by the user, never guessed.
@@ -256,10 +269,22 @@ impl Loader<'_> {
                 "no KITTI file is read, so that these times are of nothing",
             ));
         }
-        let all_integrated = self.spec.estimates.iter().all(|e| *e == EstimateSpec::ImuEuler);
-        if self.spec.estimate_frame != EstimateFrame::Body && all_integrated {
+        let of_camera = self.spec.estimate_as.contains(&Convention::CameraAsBody);
+        if of_camera && self.spec.estimate_frame != EstimateFrame::Body {
             return Err(RunError::usage(
-                "estimate-frame",
+                "estimate-as",
+                "camera says what the frame of the estimates says already",
+            )
+            .advise("leave out one of `estimate-as` and `estimate-frame`"));
+        }
+        let all_integrated = self.spec.estimates.iter().all(|e| *e == EstimateSpec::ImuEuler);
+        let moved = [
+            ("estimate-frame", self.spec.estimate_frame != EstimateFrame::Body),
+            ("estimate-as", !self.spec.estimate_as.is_empty()),
+        ];
+        if let Some((field, _)) = moved.into_iter().find(|(_, given)| *given && all_integrated) {
+            return Err(RunError::usage(
+                field,
                 format!("{IMU_EULER} gives poses of the body, and no other estimate is asked for"),
             ));
         }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
+use vice_core::conventions::{Convention, Given, cure};
 use vice_core::metrics::align::{Alignment, ReferenceFromEstimate, align};
 use vice_core::metrics::associate::{Matching, PosePairs, crop};
 use vice_core::metrics::plane::Plane;
@@ -30,6 +31,9 @@ pub struct TrajectoryRequest {
     pub reference: EstimateSpec,
     /// File of the estimate, or relative motions.
     pub estimate: EstimateSpec,
+    /// What the estimate is, where that is not what it is read as.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub estimate_as: Vec<Convention>,
     /// Alignment of the estimate.
     #[serde(default = "no_alignment")]
     pub align: Alignment,
@@ -239,7 +243,9 @@ impl TrajectoryRequest {
             (_, TrajectoryFormat::Kitti) => estimate = read(&self.estimate, false)?,
             _ => {}
         }
-        Ok((reference.trajectory, estimate.trajectory))
+        let estimate = cure(&self.estimate_as, &estimate.trajectory, Given::default())
+            .map_err(|e| RunError::from(e).of("estimate-as"))?;
+        Ok((reference.trajectory, estimate))
     }
 }
 

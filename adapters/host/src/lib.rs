@@ -9,6 +9,7 @@
 //! ask          one call: its turn, its code, its answer
 //! values       the contract's values as the core's, checked
 //! dataset      a data set of a plugin
+//! factory      a plugin as a format
 //! conformance  what an adapter is expected to do, as a suite that anyone can run
 //! ```
 //!
@@ -21,6 +22,7 @@ mod binary;
 mod border;
 pub mod conformance;
 mod dataset;
+mod factory;
 mod host_log;
 mod library;
 mod place;

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use vice_abi::contract::{
     self, ABI_VERSION, CameraStampCall, Entry, FLAG_THREAD_SAFE, FreeCall, PluginTable, ProbeCall,
 };
-use vice_core::dataset::{Dataset, DatasetFactory, FormatInfo, OpenOptions, Probe, SettingInfo};
+use vice_core::dataset::{FormatInfo, SettingInfo};
 use vice_core::error::{DataError, DataResult, one_line};
 
 use crate::border::{self, Fault};
@@ -138,23 +138,6 @@ impl Plugin {
 
     pub(crate) fn library(&self) -> &Arc<Library> {
         &self.library
-    }
-}
-
-impl DatasetFactory for Plugin {
-    fn info(&self) -> FormatInfo {
-        self.library.info.clone()
-    }
-
-    fn probe(&self, path: &Path) -> Probe {
-        crate::dataset::probe(&self.library, path).unwrap_or_else(|error| {
-            tracing::warn!("asking plugin {} about {}: {error}", self.library.info.name, path.display());
-            Probe::No
-        })
-    }
-
-    fn open(&self, path: &Path, options: &OpenOptions) -> DataResult<Box<dyn Dataset>> {
-        Ok(Box::new(crate::dataset::PluginDataset::open(&self.library, path, options)?))
     }
 }
 

@@ -10,6 +10,7 @@ mod dataset;
 mod estimates;
 mod flight;
 mod labels;
+mod material;
 mod options;
 mod pattern;
 mod render;

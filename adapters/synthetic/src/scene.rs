@@ -8,8 +8,8 @@ use parry3d::math::Vector as ParryVector;
 use parry3d::query::{Ray, RayCast};
 use parry3d::shape::Cuboid;
 
+use crate::material::Material;
 use crate::rng::Rng;
-use crate::texture::Material;
 
 /// Width and depth of the room, metres; its middle is the origin of the world.
 pub const ROOM_SIDE_M: f64 = 8.0;

@@ -3,23 +3,10 @@
 //! Albedo is a number between 0 (black) and 1 (white) at a place on a face. Every material mixes scales, so that there
 //! are corners to track from half a metre as well as from seven.
 
+use crate::material::Material;
 use crate::pattern::{Spot, band, checker, digit, inside, lines, noise, rectangle, resolved, speckles, step};
 use crate::rng::{hash, unit};
 use crate::scene::Face;
-
-/// What a face is made of; the number makes two of a kind differ.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Material {
-    Tiles(u32),
-    Plaster,
-    Bricks,
-    WindowWall,
-    DoorWall,
-    PosterWall(u32),
-    Crate(u32),
-    Cardboard(u32),
-    Cabinet(u32),
-}
 
 /// Albedo of a face at a spot.
 pub(crate) fn albedo(face: &Face, at: &Spot) -> f64 {

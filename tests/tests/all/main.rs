@@ -8,6 +8,7 @@ mod annotate_detect;
 mod annotate_kill;
 mod annotate_reach;
 mod annotator;
+mod architecture;
 mod bad_input;
 mod batch;
 mod blackbird_oracle;

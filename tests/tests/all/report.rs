@@ -86,8 +86,8 @@ fn results_become_a_page_later_with_or_without_their_images() {
         "the same page from the document alone"
     );
     // The data set has moved: the page is made without images and says so.
-    let data = document["settings"]["dataset"].as_str().unwrap().to_string();
-    document["settings"]["dataset"] = "no/such/place".into();
+    let data = document["request"]["dataset"]["path"].as_str().unwrap().to_string();
+    document["request"]["dataset"]["path"] = "no/such/place".into();
     std::fs::write(path("moved.json"), document.to_string()).unwrap();
     let run = vice(&["report", text(&path("moved.json")), "--out", text(&path("moved.html"))]);
     assert!(run.stderr.contains("no/such/place") && run.stderr.contains("--dataset"), "{}", run.stderr);

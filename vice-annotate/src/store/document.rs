@@ -72,7 +72,7 @@ impl Document {
         let rows = self.points.iter().flat_map(|(name, observations)| {
             observations.values().map(|o| LabelRow { point: name.clone(), observation: *o })
         });
-        let mut labels = LabelSet::from_rows(rows).map_err(|e| DataError::new(e.to_string()))?;
+        let mut labels = LabelSet::from_rows(rows).map_err(DataError::of)?;
         labels.dataset.clone_from(&self.dataset);
         labels.camera.clone_from(&self.camera);
         Ok(labels)

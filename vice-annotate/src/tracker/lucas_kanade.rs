@@ -5,11 +5,9 @@
 use fearless_simd::{Level as SimdLevel, Simd, dispatch};
 use vice_core::camera::Pixel;
 
-use super::pyramid::{Level, Pyramid};
+use super::pyramid::{Level, Pyramid, WINDOW_PX};
 use super::window::{Corner, Patch, Region};
 
-/// Columns and rows of the window that is matched.
-pub const WINDOW_PX: usize = 21;
 const MAX_STEPS: usize = 30;
 /// Squared length of a step that ends the search, pixels².
 const SHORT_STEP_PX2: f32 = 0.01 * 0.01;

@@ -29,9 +29,10 @@ mod window;
 
 pub use corners::{Corner, corners};
 pub use lookalike::lookalike;
-pub use lucas_kanade::{WINDOW_PX, track_translation};
+pub use lucas_kanade::track_translation;
 pub use point_track::{DOUBT_CONFIDENCE, Outcome, PointTrack, Step, TrackError, TrackOptions};
 pub use pyramid::Pyramid;
+pub use pyramid::WINDOW_PX;
 
 /// Name and version of the tracker, for the labels that it made. It changes whenever its results may.
 pub const TRACKER_VERSION: &str = "vice-klt/1";

@@ -4,7 +4,8 @@ use fearless_simd::{Level as SimdLevel, Simd, dispatch};
 use vice_core::dataset::{Image, PixelFormat};
 use vice_core::error::{DataError, DataResult};
 
-use super::lucas_kanade::WINDOW_PX;
+/// Columns and rows of the window that is matched.
+pub const WINDOW_PX: usize = 21;
 
 /// A gray image and versions of it of half the size each: to the bit what OpenCV's `cvtColor` and `pyrDown` give.
 ///

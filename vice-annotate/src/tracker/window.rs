@@ -5,8 +5,7 @@
 
 use fearless_simd::{Simd, SimdBase, f32x8};
 
-use super::lucas_kanade::WINDOW_PX;
-use super::pyramid::{Level, mirrored};
+use super::pyramid::{Level, WINDOW_PX, mirrored};
 
 /// Columns of a stored row of a window.
 pub(crate) const ROW: usize = 24;

@@ -1,8 +1,5 @@
 //! `vice completions`.
 
-use clap::CommandFactory;
-
-use crate::arguments::Cli;
 use crate::terminal::{self, Outcome};
 
 /// Arguments of `vice completions`.
@@ -13,9 +10,10 @@ pub(crate) struct Args {
     shell: clap_complete::Shell,
 }
 
-pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
+/// The script for the commands of a program.
+pub(crate) fn run(args: &Args, mut command: clap::Command) -> anyhow::Result<Outcome> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::command(), "vice", &mut script);
+    clap_complete::generate(args.shell, &mut command, "vice", &mut script);
     terminal::print(&String::from_utf8(script)?)?;
     Ok(Outcome::Done)
 }

@@ -2,9 +2,9 @@
 
 use vice_run::depth::FloorFitOptions;
 use vice_run::floor::{fit_floor, render};
+use vice_run::request::DepthName;
 use vice_run::request::DepthSpec;
 use vice_run::scene::Scene;
-use vice_run::sources::DepthName;
 
 use crate::inputs::{AnchorArgs, DatasetArgs, DepthArgs, positive};
 use crate::terminal::{self, Outcome, Verbosity};

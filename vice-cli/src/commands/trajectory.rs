@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use vice_run::core::conventions::Convention;
 use vice_run::core::metrics::align::Alignment;
 use vice_run::core::metrics::plane::Plane;
 use vice_run::core::metrics::rpe::DeltaUnit;
@@ -27,6 +28,9 @@ pub(crate) struct Args {
     /// Estimated trajectory.
     #[arg(value_name = "EST")]
     estimate: EstimateSpec,
+    /// What the estimate is, where that is not what it is read as: inverse, wxyz, conjugate, mm, ned, ...
+    #[arg(long, value_name = "WORD,...", value_delimiter = ',')]
+    estimate_as: Vec<Convention>,
     /// Alignment of the estimate: none, first-pose, yaw, se3, sim3.
     #[arg(long, value_name = "HOW", default_value = "none")]
     align: Alignment,
@@ -85,6 +89,7 @@ impl Args {
         TrajectoryRequest {
             reference: self.reference.clone(),
             estimate: self.estimate.clone(),
+            estimate_as: self.estimate_as.clone(),
             align: self.align,
             n_to_align: self.n_to_align.map(|n| usize::try_from(n).unwrap_or(usize::MAX)),
             t_max_diff: self.t_max_diff,

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use vice_run::core::time::Span;
 use vice_run::detect::TagFamily;
+use vice_run::request::DepthName;
 use vice_run::request::{DatasetSpec, DepthSpec, ReferenceSpec};
-use vice_run::sources::DepthName;
 
 use super::{DatasetArgs, numbers, positive, span_not_negative, split_list};
 use crate::terminal::usage;

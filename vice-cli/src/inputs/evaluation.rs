@@ -8,8 +8,50 @@ use vice_run::request::{LabelsSpec, Protocol, Request, Scoring};
 
 use super::{DatasetArgs, DepthArgs, StreamArgs, positive, span_not_negative, split_list};
 
+/// What a request in a file takes the place of.
+pub(crate) const ASKED: [&str; 29] = [
+    "path",
+    "format",
+    "settings",
+    "camera",
+    "files",
+    "allow_writable_plugin",
+    "labels",
+    "points",
+    "observations",
+    "fps",
+    "start",
+    "duration",
+    "estimate",
+    "reference",
+    "estimate_frame",
+    "estimate_as",
+    "times",
+    "time_offset",
+    "max_gap",
+    "anchor",
+    "initial_pose",
+    "depth",
+    "floor_plane",
+    "zmap_occlusion",
+    "cloud_voxel",
+    "zcam_range",
+    "tag_size",
+    "tag_family",
+    "calibration",
+];
+
+fn unless_requested(argument: clap::Arg) -> clap::Arg {
+    argument.required(false).required_unless_present("request")
+}
+
 /// Data set, labels, pose streams and depth; or all of it from a file.
 #[derive(Debug, clap::Args)]
+#[command(
+    mut_arg("path", unless_requested),
+    mut_arg("labels", unless_requested),
+    mut_arg("estimate", unless_requested)
+)]
 pub(crate) struct EvaluationArgs {
     #[command(flatten)]
     dataset: DatasetArgs,
@@ -29,7 +71,7 @@ pub(crate) struct EvaluationArgs {
         long,
         value_name = "FILE.json",
         help_heading = "Request",
-        conflicts_with_all = ["DatasetArgs", "PluginArgs", "LabelArgs", "WindowArgs", "StreamArgs", "DepthArgs", "depth"]
+        conflicts_with_all = ASKED
     )]
     request: Option<PathBuf>,
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use vice_run::core::conventions::Convention;
 use vice_run::core::time::Span;
 use vice_run::request::{Anchor, EstimateFrame, EstimateSpec, ReferenceSpec, StreamsSpec};
 
@@ -21,6 +22,10 @@ pub(crate) struct StreamArgs {
     /// Whose poses the estimates give: body, camera, or a file with body_from_estimate (4x4).
     #[arg(long, value_name = "body|camera|FILE", default_value = "body")]
     estimate_frame: EstimateFrame,
+    /// What the estimates are, where that is not what they are read as: inverse, wxyz, conjugate, camera, mm, cm, ft,
+    /// ned, ... (a wrong word lists all).
+    #[arg(long, value_name = "WORD,...", value_delimiter = ',')]
+    estimate_as: Vec<Convention>,
     /// Times of KITTI files [default: times.txt beside each].
     #[arg(long, value_name = "FILE")]
     times: Option<PathBuf>,
@@ -51,6 +56,7 @@ impl StreamArgs {
             estimates,
             reference: ReferenceSpec::from(self.reference.clone()),
             estimate_frame: self.estimate_frame.clone(),
+            estimate_as: self.estimate_as.clone(),
             times: self.times.clone(),
             time_offset: self.time_offset,
             max_gap: self.max_gap,

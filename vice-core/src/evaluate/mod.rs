@@ -81,13 +81,13 @@ pub enum EvaluateError {
         suspicion: Option<String>,
     },
     /// No labelled frame lies in the window.
-    #[error("no label lies in the part of the run that was asked for (see `start`, `duration`)")]
+    #[error("no label lies in the part of the run that was asked for")]
     EmptyWindow,
     /// No point has a key frame.
     #[error("no label is marked as a key frame, so that there is nothing to carry along")]
     NoKeyframe,
     /// No key frame is manual.
-    #[error("no key frame is manual, so that no manual label can be scored by itself (see `observations`)")]
+    #[error("no key frame is manual, so that no manual label can be scored by itself")]
     NoManualKeyframe,
     /// Every key frame is flagged as uncertain.
     #[error("every key frame is flagged as uncertain, so that no label can be scored")]

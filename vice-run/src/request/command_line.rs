@@ -40,6 +40,7 @@ fn options(request: &Request) -> Vec<(&'static str, String)> {
     add("reference", streams.reference.clone().into());
     let frame = streams.estimate_frame.to_string();
     add("estimate-frame", (frame != "body").then_some(frame));
+    add("estimate-as", list(streams.estimate_as.iter().map(ToString::to_string).collect()));
     add("times", streams.times.as_ref().map(|p| p.display().to_string()));
     add("time-offset", streams.time_offset.map(|s| s.as_secs_f64().to_string()));
     let gap = (streams.max_gap != super::DEFAULT_MAX_GAP).then(|| streams.max_gap.as_secs_f64().to_string());

@@ -5,27 +5,26 @@
 //! that a relative path means the folder in which the request is run.
 
 mod command_line;
+mod depth_name;
 mod estimate;
-mod read;
 mod word;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use vice_core::error::ErrorKind;
+use vice_core::conventions::Convention;
 use vice_core::evaluate::{Observations, Window};
 use vice_core::metrics::align::Alignment;
 use vice_core::time::Span;
 use vice_detect::TagFamily;
 
+pub use depth_name::DepthName;
 pub use estimate::{Anchor, EstimateFrame, EstimateSpec, IMU_EULER, ReferenceSpec};
 
 pub(crate) use word::{seconds, seconds_option};
 
 use crate::error::{RunError, RunResult};
-use crate::open::Opened;
-use crate::sources::DepthName;
 
 /// Everything that says what is evaluated, and how.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -141,6 +140,9 @@ pub struct StreamsSpec {
     /// Whose poses the estimates give.
     #[serde(default)]
     pub estimate_frame: EstimateFrame,
+    /// What the estimates are, where that is not what they are read as: mended before anything else.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub estimate_as: Vec<Convention>,
     /// Times of KITTI files; `None`: times.txt beside each.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub times: Option<PathBuf>,
@@ -178,6 +180,7 @@ impl Default for StreamsSpec {
             estimates: Vec::new(),
             reference: ReferenceSpec::default(),
             estimate_frame: EstimateFrame::default(),
+            estimate_as: Vec::new(),
             times: None,
             time_offset: None,
             max_gap: DEFAULT_MAX_GAP,
@@ -243,14 +246,6 @@ impl Request {
         }
     }
 
-    /// Reads a request, or that of a result document.
-    ///
-    /// # Errors
-    /// [`vice_core::error::DataError`] with the path and line if the file cannot be read or is neither.
-    pub fn read(path: impl AsRef<Path>) -> RunResult<Self> {
-        Ok(read::read(path.as_ref())?)
-    }
-
     /// The command line of `vice evaluate` that asks for the same.
     pub fn command_line(&self) -> String {
         command_line::of(self)
@@ -296,27 +291,6 @@ impl Protocol {
     /// The window of a run, for some labels.
     pub const fn window(&self, observations: Observations) -> Window {
         Window { fps: self.fps, start: self.start, duration: self.duration, observations }
-    }
-
-    /// Indices of the frames that are looked at, where nothing is scored.
-    ///
-    /// # Errors
-    /// [`RunError`] of the kind usage if there are none.
-    pub fn frames(&self, opened: &Opened) -> RunResult<Vec<usize>> {
-        self.check()?;
-        let frames = self.window(Observations::default()).frames(&opened.frames);
-        if frames.is_empty() {
-            return Err(RunError::new(
-                ErrorKind::Usage,
-                format!(
-                    "no frame lies in the part of the run that was asked for; camera {} has {}",
-                    opened.camera_name,
-                    opened.frames.len()
-                ),
-            )
-            .advise("see `start` and `duration`"));
-        }
-        Ok(frames)
     }
 
     /// Refuses negative times and rates.

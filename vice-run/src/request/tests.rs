@@ -1,3 +1,5 @@
+use vice_core::error::ErrorKind;
+
 use super::*;
 
 fn everything() -> Request {
@@ -63,7 +65,7 @@ fn a_setting_of_a_source_that_is_not_asked_is_refused() {
     let mut request = Request::new("a", "b", []);
     request.depth.zcam_range_m = Some([0.1, 5.0]);
     let error = request.check().unwrap_err();
-    assert_eq!((error.kind(), error.field()), (vice_core::error::ErrorKind::Usage, Some("zcam-range")));
+    assert_eq!((error.kind(), error.field()), (ErrorKind::Usage, Some("zcam-range")));
     request.depth.sources = vec![DepthName::ZCam];
     request.check().unwrap();
     request.depth.zcam_range_m = Some([5.0, 0.1]);

@@ -3,6 +3,7 @@
 //!
 //! Units stand in the names. A number that could not be had is null, never NaN.
 
+mod of_request;
 mod read;
 mod version_1;
 
@@ -11,7 +12,7 @@ use vice_core::result::{DatasetPart, Evaluated, PathPart, PixelPart, TrajectoryP
 use vice_core::suspicion::Suspicions;
 
 pub use read::read;
-pub(crate) use read::{parse, read_bytes};
+use read::{parse, read_bytes};
 
 use crate::request::Request;
 

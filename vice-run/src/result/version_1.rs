@@ -111,6 +111,7 @@ fn request(s: &Settings, dataset: &DatasetPart, pixel: &[PixelPart]) -> Request 
             estimates: list("estimate").into_iter().map(EstimateSpec::from).collect(),
             reference: ReferenceSpec::from(other("reference").map(str::to_string)),
             estimate_frame: EstimateFrame::from(s.estimate_frame.clone()),
+            estimate_as: Vec::new(),
             times: other("times").map(PathBuf::from),
             time_offset: (s.time_offset_s != 0.0).then(|| span(s.time_offset_s)),
             max_gap: span(s.max_gap_s),

@@ -70,7 +70,7 @@ impl Dataset for Run {
     }
 
     fn camera(&self, _: &str) -> DataResult<Camera> {
-        Camera::new(8, 4, [6.0, 6.0, 3.5, 1.5], Model::Pinhole).map_err(|e| DataError::new(e.to_string()))
+        Camera::new(8, 4, [6.0, 6.0, 3.5, 1.5], Model::Pinhole).map_err(DataError::of)
     }
 
     fn frames(&self, _: &str) -> DataResult<Arc<[Stamp]>> {

@@ -7,6 +7,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use anyhow::Context;
+use vice_run::core::dataset::OpenOptions;
 use vice_run::host::conformance::{Event, Verdict};
 
 use super::child;
@@ -20,25 +21,25 @@ use crate::terminal::{self, Outcome, printable, usage};
 pub(crate) struct Args {
     /// The plugin, a shared library.
     #[arg(value_name = "FILE")]
-    pub(super) file: PathBuf,
+    file: PathBuf,
     /// A data set of its format.
     #[arg(value_name = "DATASET")]
-    pub(super) dataset: PathBuf,
+    dataset: PathBuf,
     /// Setting of the format.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = crate::inputs::setting)]
-    pub(super) settings: Vec<(String, String)>,
+    settings: Vec<(String, String)>,
     /// Times the data set is opened and closed.
     #[arg(long, value_name = "N", default_value = "1000")]
-    pub(super) cycles: u32,
+    cycles: u32,
     /// Images that are read of each camera.
     #[arg(long, value_name = "N", default_value = "200")]
-    pub(super) images: usize,
+    images: usize,
     /// Seconds after which a call counts as hanging.
     #[arg(long, value_name = "S", default_value = "120", value_parser = clap::value_parser!(u64).range(1..))]
     timeout: u64,
     /// Load the plugin even from a file or folder that others may write to.
     #[arg(long)]
-    pub(super) allow_writable_plugin: bool,
+    allow_writable_plugin: bool,
     /// Run the suite itself: what the program starts as its child.
     #[arg(long, hide = true)]
     as_child: bool,
@@ -46,7 +47,14 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     if args.as_child {
-        return child::run(args);
+        return child::run(&child::Task {
+            file: &args.file,
+            dataset: &args.dataset,
+            options: OpenOptions { settings: args.settings.iter().cloned().collect() },
+            cycles: args.cycles,
+            images: args.images,
+            allow_writable: args.allow_writable_plugin,
+        });
     }
     if !args.dataset.exists() {
         return Err(usage(format!("{}: no such file or folder", args.dataset.display())));

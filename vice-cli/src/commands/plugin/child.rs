@@ -1,13 +1,13 @@
 //! The process in which the conformance suite runs, and the lines by which it tells its parent.
 
 use std::io::Write;
+use std::path::Path;
 use std::process;
 
 use vice_run::core::dataset::OpenOptions;
 use vice_run::host::conformance::{self, Event, Subject, Thoroughness, Verdict};
 use vice_run::host::{LoadOptions, Plugin};
 
-use super::check::Args;
 use crate::terminal::{self, Outcome, printable};
 
 /// Exit code where the library does not load: the error was printed.
@@ -22,22 +22,28 @@ pub(super) enum Line {
     End,
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let options = LoadOptions { allow_writable: args.allow_writable_plugin };
-    let plugin = match Plugin::load(&args.file, &options) {
+/// What is checked, and how thoroughly.
+pub(super) struct Task<'a> {
+    pub(super) file: &'a Path,
+    pub(super) dataset: &'a Path,
+    pub(super) options: OpenOptions,
+    pub(super) cycles: u32,
+    pub(super) images: usize,
+    pub(super) allow_writable: bool,
+}
+
+pub(super) fn run(task: &Task<'_>) -> anyhow::Result<Outcome> {
+    let options = LoadOptions { allow_writable: task.allow_writable };
+    let plugin = match Plugin::load(task.file, &options) {
         Ok(plugin) => plugin,
         Err(error) => {
             terminal::print_error(&anyhow::Error::new(error));
             process::exit(LOAD_FAILED);
         }
     };
-    let subject = Subject {
-        factory: &plugin,
-        plugin: Some(&plugin),
-        path: &args.dataset,
-        options: &OpenOptions { settings: args.settings.iter().cloned().collect() },
-    };
-    let thorough = Thoroughness { cycles: args.cycles, images: args.images, ..Thoroughness::default() };
+    let subject =
+        Subject { factory: &plugin, plugin: Some(&plugin), path: task.dataset, options: &task.options };
+    let thorough = Thoroughness { cycles: task.cycles, images: task.images, ..Thoroughness::default() };
     conformance::check(&subject, &thorough, &mut |event| tell(&event));
     write("end", "");
     Ok(Outcome::Done)

@@ -4,10 +4,22 @@ use std::path::Path;
 
 use vice_core::error::{DataError, DataResult, ErrorKind};
 
-use super::Request;
+use super::{parse as parse_document, read_bytes};
+use crate::error::RunResult;
+use crate::request::Request;
 
-pub(super) fn read(path: &Path) -> DataResult<Request> {
-    let text = crate::result::read_bytes(path)?;
+impl Request {
+    /// Reads a request, or that of a result document.
+    ///
+    /// # Errors
+    /// [`vice_core::error::DataError`] with the path and line if the file cannot be read or is neither.
+    pub fn read(path: impl AsRef<Path>) -> RunResult<Self> {
+        Ok(read(path.as_ref())?)
+    }
+}
+
+fn read(path: &Path) -> DataResult<Request> {
+    let text = read_bytes(path)?;
     parse(&text).map_err(|e| e.at(path))
 }
 
@@ -22,6 +34,6 @@ fn parse(text: &[u8]) -> DataResult<Request> {
     let head: Head = serde_json::from_slice(text).map_err(|e| at(e, "is no request: it is not JSON"))?;
     match head.schema {
         None => serde_json::from_slice(text).map_err(|e| at(e, "is a request with a mistake in it")),
-        Some(_) => crate::result::parse(text).map(|document| document.request),
+        Some(_) => parse_document(text).map(|document| document.request),
     }
 }

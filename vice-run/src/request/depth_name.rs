@@ -1,0 +1,68 @@
+//! The one list of depth sources.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+/// A depth source by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum DepthName {
+    /// A plane: the floor.
+    Floor,
+    /// A point cloud, projected and interpolated.
+    ZMap,
+    /// A depth camera registered to the images.
+    ZCam,
+    /// The faces of a scan.
+    Mesh,
+    /// AprilTags of a known size.
+    Tag,
+}
+
+impl DepthName {
+    /// All sources.
+    pub const ALL: [Self; 5] = [Self::Floor, Self::ZMap, Self::ZCam, Self::Mesh, Self::Tag];
+
+    /// The name in requests, tables and documents.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Floor => "floor",
+            Self::ZMap => "zmap",
+            Self::ZCam => "zcam",
+            Self::Mesh => "mesh",
+            Self::Tag => "tag",
+        }
+    }
+}
+
+impl fmt::Display for DepthName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for DepthName {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let known = || Self::ALL.map(Self::name).join(", ");
+        let found = Self::ALL.into_iter().find(|n| n.name() == text);
+        found.ok_or_else(|| format!("unknown depth source {text}; known: {}", known()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_source_is_found_by_its_own_name() {
+        for name in DepthName::ALL {
+            assert_eq!(name.name().parse(), Ok(name));
+            assert_eq!(serde_json::to_string(&name).unwrap(), format!("\"{name}\""));
+        }
+        assert!("sonar".parse::<DepthName>().unwrap_err().contains("known: floor, zmap, zcam, mesh, tag"));
+    }
+}
