@@ -7,7 +7,7 @@ use vice_core::camera::Pixel;
 use vice_core::dataset::GROUND_TRUTH;
 use vice_core::depth::{DepthSource, Keyframe};
 use vice_core::error::{DataError, DataResult};
-use vice_core::evaluate::{EvaluateError, Evaluation, Selection, Window, evaluate};
+use vice_core::evaluate::{EvaluateError, Evaluation, Observations, Selection, Window, evaluate};
 use vice_core::frames::WorldFromCamera;
 use vice_core::label::{LabelRow, LabelSet, Observation};
 use vice_core::metrics::align::Alignment;
@@ -108,7 +108,9 @@ impl SceneEstimates {
 
     fn evaluate(&self, labels: &LabelSet) -> Result<Evaluated, EvaluateError> {
         let opened = &self.opened;
-        let selection = Selection::new(labels, &opened.frames, &opened.camera, &Window::default())?;
+        // While labels are placed the doubtful ones are what one looks at.
+        let window = Window { observations: Observations::All, ..Window::default() };
+        let selection = Selection::new(labels, &opened.frames, &opened.camera, &window)?;
         let streams = self.streams_for(&selection)?;
         evaluate(
             &Evaluation {
@@ -119,7 +121,9 @@ impl SceneEstimates {
                 selection: &selection,
                 streams: &streams.list,
                 anchor: streams.anchor,
+                own_anchors: streams.own_anchors,
                 depths: &[self.depth.as_ref()],
+                checks: &[],
                 max_gap: self.request.streams.max_gap,
                 subsets: None,
                 align: Alignment::None,

@@ -12,7 +12,7 @@ use vice_run::core::time::Span;
 use vice_run::files::atomic::{self, Overwrite};
 
 pub(crate) use dataset::{DatasetArgs, PluginArgs, setting};
-pub(crate) use depth::{AnchorArgs, DepthArgs, SourceArgs};
+pub(crate) use depth::{AnchorArgs, DepthArgs, SourceArgs, on_off};
 #[cfg(test)]
 pub(crate) use evaluation::ASKED;
 pub(crate) use evaluation::{EvaluationArgs, LabelArgs, WindowArgs};

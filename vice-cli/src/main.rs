@@ -45,6 +45,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::TooManySkips) => ExitCode::from(3),
+        Ok(Outcome::RequirementBroken) => ExitCode::from(4),
         Err(error) if terminal::is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             terminal::print_error(&error);

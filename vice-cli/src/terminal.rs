@@ -20,6 +20,8 @@ pub(crate) enum Outcome {
     Done,
     /// Done, but more labels than allowed could not be scored.
     TooManySkips,
+    /// Done, but a limit that was required is broken.
+    RequirementBroken,
 }
 
 /// Options that do not fit together or the data: exit code 2.
@@ -216,7 +218,7 @@ pub(crate) fn with_options(hint: &str) -> String {
 }
 
 /// Fields that have an option of the same name.
-const FIELDS: [&str; 31] = [
+const FIELDS: [&str; 32] = [
     "add",
     "align",
     "allow-writable-plugin",
@@ -227,6 +229,7 @@ const FIELDS: [&str; 31] = [
     "chessboard",
     "cloud-voxel",
     "depth",
+    "depth-check",
     "duration",
     "estimate",
     "estimate-as",

@@ -131,6 +131,11 @@ pub trait DepthSource: Send + Sync {
     /// in the world of that floor or cloud.
     fn needs_world(&self, floor: &Floor) -> bool;
 
+    /// Whether the source takes a shape for granted, as a floor does, and so is no witness against one that measures.
+    fn is_assumed(&self) -> bool {
+        false
+    }
+
     /// Whether the source decodes images or depth images of the data set.
     fn needs_images(&self) -> bool {
         false

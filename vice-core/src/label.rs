@@ -70,7 +70,7 @@ pub struct Observation {
     pub keyframe: bool,
     /// The point is hidden here: not scored.
     pub occluded: bool,
-    /// The annotator is not sure: scored, and shown as such.
+    /// The annotator is not sure: scored only where all labels are asked for, and shown as such.
     pub uncertain: bool,
     /// What the machine that made it says.
     pub provenance: Provenance,

@@ -13,6 +13,7 @@ pub mod camera;
 pub mod conventions;
 pub mod dataset;
 pub mod depth;
+pub mod depth_doubt;
 pub mod diagnose;
 pub mod error;
 pub mod evaluate;

@@ -2,6 +2,12 @@
 //!
 //! Units stand in the names. A number that could not be had is null, never NaN.
 
+mod depth_doubt;
+mod held;
+
+pub use depth_doubt::{DepthDoubt, DepthDoubtReason};
+pub use held::{AsideReason, Figure, HeldPart, SetAside, WindowPart};
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -70,12 +76,30 @@ pub struct PixelPart {
     pub rmse_px: BTreeMap<usize, Option<SubsetRmse>>,
     /// RMSE_2D of all points together, pixels; null where nothing was scored.
     pub pooled_rmse_px: Option<f64>,
+    /// RMSE_2D of the labels that hold, pixels; null where none does.
+    #[serde(default)]
+    pub held_rmse_px: Option<f64>,
+    /// Its 95 % interval, low and high, pixels; null where there is none.
+    #[serde(default)]
+    pub interval_95: Option<[f64; 2]>,
+    /// What these two rest on; left out where nothing was scored.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held: Option<HeldPart>,
+    /// The error by age since the key frame.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub by_age: Vec<WindowPart>,
+    /// The error by metres that the camera moved since the key frame.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub by_distance: Vec<WindowPart>,
     /// Number of scored samples.
     pub scored: u64,
     /// What could not be scored, and why.
     pub skipped: Vec<Skip>,
     /// Key frames that were used, with their depth.
     pub keyframes: Vec<KeyframePart>,
+    /// Key frames whose depth is doubtful, and why.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub depth_doubts: Vec<DepthDoubt>,
     /// The scored samples; empty where they were not asked for.
     pub samples: Vec<Sample>,
 }
@@ -165,6 +189,22 @@ pub struct TrajectoryPart {
     /// The errors over time, for plots; empty where the samples were not asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub frames: Vec<FrameError>,
+    /// The error of the motion since each key frame, for plots; empty where the samples were not asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub since_keyframe: Vec<MotionError>,
+}
+
+/// By how much the estimate's motion from a key frame to a labelled frame is off. No alignment enters.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MotionError {
+    /// The key frame.
+    pub keyframe_ns: Stamp,
+    /// The labelled frame.
+    pub timestamp_ns: Stamp,
+    /// Distance between where the two motions lead to, metres.
+    pub position_m: f64,
+    /// Angle between the two motions' rotations, radians.
+    pub angle_rad: f64,
 }
 
 /// The error of an estimate at a time, after alignment.
@@ -209,12 +249,20 @@ impl Evaluated {
     pub fn drop_samples(&mut self) {
         self.paths.clear();
         self.pixel.iter_mut().for_each(|p| p.samples.clear());
-        self.trajectory.iter_mut().for_each(|t| t.frames.clear());
+        self.trajectory.iter_mut().for_each(TrajectoryPart::drop_plots);
     }
 
     /// Largest [`PixelPart::skipped_percent`] of all parts.
     pub fn worst_skipped_percent(&self) -> f64 {
         self.pixel.iter().map(PixelPart::skipped_percent).fold(0.0, f64::max)
+    }
+}
+
+impl TrajectoryPart {
+    /// Leaves out what only plots need.
+    pub fn drop_plots(&mut self) {
+        self.frames.clear();
+        self.since_keyframe.clear();
     }
 }
 

@@ -25,6 +25,10 @@ pub enum SkipReason {
     NotManual,
     /// A machine made its key frame, and only manual labels were asked for.
     KeyframeNotManual,
+    /// Whoever made it is not sure, and only certain labels were asked for.
+    Uncertain,
+    /// Whoever made its key frame is not sure, and only certain labels were asked for.
+    KeyframeUncertain,
     /// The stream has no pose at its key frame.
     KeyframeGap,
     /// Its frame lies in too wide a gap of the stream.
@@ -45,13 +49,15 @@ pub enum SkipReason {
 
 impl SkipReason {
     /// All reasons.
-    const ALL: [Self; 25] = [
+    const ALL: [Self; 27] = [
         Self::NoFrame,
         Self::KeyframeNoFrame,
         Self::BeforeFirstKeyframe,
         Self::Occluded,
         Self::NotManual,
         Self::KeyframeNotManual,
+        Self::Uncertain,
+        Self::KeyframeUncertain,
         Self::KeyframeGap,
         Self::FrameGap,
         Self::BeforeStream,
@@ -75,7 +81,7 @@ impl SkipReason {
 
     /// Whether somebody left the label out on purpose: no gap in the data.
     pub const fn is_wanted(self) -> bool {
-        matches!(self, Self::Occluded | Self::NotManual)
+        matches!(self, Self::Occluded | Self::NotManual | Self::Uncertain)
     }
 
     /// Whether the stream carried the point out of the camera's reach: a finding about the stream.
@@ -92,6 +98,8 @@ impl SkipReason {
             Self::Occluded => "occluded",
             Self::NotManual => "not-manual",
             Self::KeyframeNotManual => "keyframe-not-manual",
+            Self::Uncertain => "uncertain",
+            Self::KeyframeUncertain => "keyframe-uncertain",
             Self::KeyframeGap => "keyframe-gap",
             Self::FrameGap => "frame-gap",
             Self::BeforeStream => "before-stream",

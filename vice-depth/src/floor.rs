@@ -64,6 +64,10 @@ impl DepthSource for FloorDepth {
         matches!(floor, Floor::World(_))
     }
 
+    fn is_assumed(&self) -> bool {
+        true
+    }
+
     fn depths(
         &self,
         keyframe: &Keyframe<'_>,

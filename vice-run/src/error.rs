@@ -123,13 +123,14 @@ impl From<EvaluateError> for RunError {
             EvaluateError::Data(inner) => inner.kind(),
             EvaluateError::EmptyWindow
             | EvaluateError::NoManualKeyframe
+            | EvaluateError::NoCertainKeyframe
             | EvaluateError::SubsetTooLarge { .. } => ErrorKind::Usage,
             EvaluateError::NoFrames | EvaluateError::NoLabels | EvaluateError::NoStream => ErrorKind::Missing,
             _ => ErrorKind::Contradictory,
         };
         let hint = match &error {
             EvaluateError::EmptyWindow => Some("see `start` and `duration`"),
-            EvaluateError::NoManualKeyframe => Some("see `observations`"),
+            EvaluateError::NoManualKeyframe | EvaluateError::NoCertainKeyframe => Some("see `observations`"),
             _ => None,
         };
         match hint {

@@ -9,7 +9,7 @@ use vice_core::time::Stamp;
 use crate::error::{Context, RunError, RunResult};
 use crate::open::Opened;
 use crate::request::{LabelsSpec, Request};
-use crate::result::{ResultDocument, Used};
+use crate::result::{OWN_ANCHOR, ResultDocument, Used};
 use crate::streams::LoadedStreams;
 
 /// Called with what is being done, and (done, total) of it.
@@ -80,16 +80,23 @@ impl Request {
         progress: &Progress<'_>,
     ) -> RunResult<ResultDocument> {
         let keep = matches!(samples, Samples::Keep);
+        let (checks, not_made) = self.depth.make_checks(opened);
+        let checks: Vec<&dyn DepthSource> = checks.iter().map(AsRef::as_ref).collect();
         self.with_evaluation(opened, keep, |evaluation, streams| {
             let step = |done, total| progress("evaluating", done, total);
+            let evaluation = &Evaluation { checks: &checks, ..*evaluation };
             let mut found = match samples {
                 Samples::Stream(sink) => evaluate_streaming(evaluation, &step, sink)?,
                 _ => evaluate(evaluation, &step)?,
             };
             found.suspicions.extend(streams.suspicions.clone());
+            found.suspicions.extend(not_made);
             let used = Used {
                 points: evaluation.selection.point_names().map(str::to_string).collect(),
-                anchor: streams.list[streams.anchor].name.clone(),
+                anchor: match streams.own_anchors {
+                    true => OWN_ANCHOR.to_string(),
+                    false => streams.list[streams.anchor].name.clone(),
+                },
                 time_offset_s: streams.time_offset.as_secs_f64(),
                 align: evaluation.align.name().to_string(),
             };
@@ -130,6 +137,10 @@ impl Request {
         let sources = self.depth.make_all(opened)?;
         let sources: Vec<&dyn DepthSource> = sources.iter().map(AsRef::as_ref).collect();
         self.streams.check_world(opened, &mut streams, &selection, &sources)?;
+        if self.scoring.align.is_some() {
+            // What is asked for goes before what a stream would have by itself.
+            streams.list.iter_mut().for_each(|s| s.align = None);
+        }
         let evaluation = Evaluation {
             dataset: opened.dataset.as_ref(),
             camera_name: &opened.camera_name,
@@ -138,10 +149,12 @@ impl Request {
             selection: &selection,
             streams: &streams.list,
             anchor: streams.anchor,
+            own_anchors: streams.own_anchors,
             depths: &sources,
+            checks: &[],
             max_gap: self.streams.max_gap,
             subsets: (!self.scoring.subsets.is_empty()).then_some(self.scoring.subsets.as_slice()),
-            align: self.scoring.align,
+            align: self.scoring.align.unwrap_or_default(),
             keep_samples,
         };
         work(&evaluation, &streams)

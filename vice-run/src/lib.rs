@@ -35,6 +35,7 @@ pub mod open;
 pub mod plugin;
 pub mod report;
 pub mod request;
+pub mod require;
 pub mod result;
 pub mod scene;
 pub mod sources;

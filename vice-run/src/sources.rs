@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use vice_core::dataset::{CloudRef, CloudSource, Dataset};
 use vice_core::depth::DepthSource;
+use vice_core::error::one_line;
+use vice_core::suspicion::Suspicion;
 use vice_depth::{
     Cloud, CloudOptions, FloorDepth, Mesh, MeshDepth, ZCamDepth, ZCamOptions, ZMapDepth, ZMapOptions,
     load_cloud,
@@ -21,6 +23,41 @@ impl DepthSpec {
     /// [`RunError`] if the data set has not what a source needs.
     pub fn make_all(&self, opened: &Opened) -> RunResult<Vec<Box<dyn DepthSource>>> {
         self.names().into_iter().map(|name| self.make(name, opened)).collect()
+    }
+
+    /// The sources that the depths at the key frames are compared with: what the recording has beside those that are
+    /// asked for. One that cannot be made is a suspicion, since nothing is scored with it.
+    pub fn make_checks(&self, opened: &Opened) -> (Vec<Box<dyn DepthSource>>, Vec<Suspicion>) {
+        let (mut made, mut failed) = (Vec::new(), Vec::new());
+        if self.compare == Some(false) {
+            return (made, failed);
+        }
+        let asked = self.names();
+        // A mesh is the same scan as the Z-map's cloud.
+        let scanned = asked.contains(&DepthName::ZMap) || asked.contains(&DepthName::Mesh);
+        let has_cloud = || !matches!(opened.dataset.cloud(), Ok(None));
+        let there = [
+            (
+                DepthName::ZCam,
+                !asked.contains(&DepthName::ZCam) && opened.dataset.has_depth(&opened.camera_name),
+            ),
+            (DepthName::ZMap, !scanned && has_cloud()),
+        ];
+        for (name, _) in there.into_iter().filter(|(_, there)| *there) {
+            match self.make(name, opened) {
+                Ok(source) => made.push(source),
+                Err(error) => failed.push(
+                    Suspicion::new(
+                        "depth-not-compared",
+                        name.name(),
+                        "depths cannot be compared with this source",
+                    )
+                    .evidence(one_line(&error))
+                    .advice("leave it out with `depth-check` off"),
+                ),
+            }
+        }
+        (made, failed)
     }
 
     /// One source.

@@ -10,6 +10,7 @@ use vice_core::depth::DepthSource;
 use vice_core::diagnose::InertialRun;
 use vice_core::evaluate::{Selection, Stream};
 use vice_core::frames::{Body, Rigid, Sensor, WorldFromBody, WorldFromCamera};
+use vice_core::metrics::align::Alignment;
 use vice_core::metrics::associate::{Matching, PosePairs};
 use vice_core::metrics::quaternion_order;
 use vice_core::metrics::rotation_offset::RotationOffset;
@@ -31,6 +32,8 @@ pub struct LoadedStreams {
     pub list: Vec<Stream>,
     /// Index of the one that places the camera for depth.
     pub anchor: usize,
+    /// Each stream places the camera for its own depth.
+    pub own_anchors: bool,
     /// What was added to the stamps of the estimates.
     pub time_offset: Span,
     /// What looks wrong with them.
@@ -78,17 +81,20 @@ impl StreamsSpec {
                 loader.estimate(spec)?
             };
             let name = stream_name(spec, &list);
-            let stream = Stream { name, role: Role::Estimate, trajectory, time_offset };
+            // What starts in the reference's own state is in its world: moving it there would hide its drift.
+            let align = integrates.then_some(Alignment::FirstPose);
+            let stream = Stream { name, role: Role::Estimate, trajectory, time_offset, align };
             if let (Some(reference), false) = (&loader.reference, integrates) {
                 loader.suspicions.extend(turned_body(reference, &stream, self.max_gap));
             }
             list.push(stream);
         }
         loader.check_used()?;
-        let anchor = loader.anchor(&mut list)?;
+        let (anchor, own_anchors) = loader.anchor(&mut list)?;
         // An initial pose moves the anchor to another world than it was integrated in.
         let inertial = inertial.filter(|(index, _)| self.initial_pose.is_none() || *index != anchor);
-        Ok(LoadedStreams { list, anchor, time_offset, suspicions: loader.suspicions, inertial })
+        let suspicions = loader.suspicions;
+        Ok(LoadedStreams { list, anchor, own_anchors, time_offset, suspicions, inertial })
     }
 
     /// Whether the estimates place the camera by themselves where a source asks for the world: refused where they cannot
@@ -105,33 +111,36 @@ impl StreamsSpec {
     ) -> RunResult<()> {
         let Some(stamp) = selection.first_keyframe() else { return Ok(()) };
         let floor = opened.dataset.floor(stamp)?;
-        let anchor = streams.list.get(streams.anchor);
-        if self.initial_pose.is_some()
-            || anchor.is_none_or(|a| a.role == Role::Reference)
-            || !sources.iter().any(|s| s.needs_world(&floor))
-        {
+        if self.initial_pose.is_some() || !sources.iter().any(|s| s.needs_world(&floor)) {
             return Ok(());
         }
-        let Some(spec) = self.estimates.first() else { return Ok(()) };
-        if matches!(spec, EstimateSpec::Relative(_)) || opened.dataset.is_relative(&spec.to_string()) {
-            return Err(RunError::usage(
-                "depth",
-                format!(
-                    "{spec} places the camera for depth, but relative motions have no place in the world"
-                ),
-            )
-            .advise("give `initial-pose`, or `depth` zcam"));
+        let placing = |index: usize| streams.own_anchors || index == streams.anchor;
+        let list = streams.list.iter().enumerate();
+        let estimates = list.filter(|(_, s)| s.role == Role::Estimate).zip(&self.estimates);
+        let placing: Vec<&EstimateSpec> =
+            estimates.filter(|((index, _), _)| placing(*index)).map(|(_, spec)| spec).collect();
+        for spec in placing {
+            streams.suspicions.add(own_world(opened, spec)?);
         }
-        streams.suspicions.add(
-            Suspicion::new(
-                "own-world",
-                spec.to_string(),
-                "it places the camera for depth by itself: the floor or cloud must be in its world",
-            )
-            .advice("else give `initial-pose`"),
-        );
         Ok(())
     }
+}
+
+/// What is to be said of an estimate that places the camera by itself.
+fn own_world(opened: &Opened, spec: &EstimateSpec) -> RunResult<Suspicion> {
+    if matches!(spec, EstimateSpec::Relative(_)) || opened.dataset.is_relative(&spec.to_string()) {
+        return Err(RunError::usage(
+            "depth",
+            format!("{spec} places the camera for depth, but relative motions have no place in the world"),
+        )
+        .advise("give `initial-pose`, or `depth` zcam"));
+    }
+    Ok(Suspicion::new(
+        "own-world",
+        spec.to_string(),
+        "it places the camera for depth by itself: the floor or cloud must be in its world",
+    )
+    .advice("else give `initial-pose`"))
 }
 
 struct Loader<'a> {
@@ -284,24 +293,33 @@ impl Loader<'_> {
         Ok(())
     }
 
-    /// Which stream places the camera; an initial pose moves its world.
-    fn anchor(&self, list: &mut [Stream]) -> RunResult<usize> {
+    /// Which stream places the camera, and whether each does so for itself; an initial pose moves its world.
+    fn anchor(&self, list: &mut [Stream]) -> RunResult<(usize, bool)> {
         let has_reference = self.reference.is_some();
-        let anchor = match self.spec.anchor {
+        let anchor = match &self.spec.anchor {
             Some(Anchor::Reference) if !has_reference => {
                 return Err(RunError::usage("anchor", "there is no reference")
                     .advise("give `reference`, or `anchor` estimate"));
             }
             Some(Anchor::Estimate) => usize::from(has_reference),
-            _ => 0,
+            Some(Anchor::Stream(name)) => list.iter().position(|s| s.name == *name).ok_or_else(|| {
+                let names: Vec<&str> = list.iter().map(|s| s.name.as_str()).collect();
+                RunError::usage(
+                    "anchor",
+                    format!("there is no stream {name}; there are {}", names.join(", ")),
+                )
+            })?,
+            Some(Anchor::Reference) | None => 0,
         };
+        // Without a reference no estimate is better known than the others, and their order must not matter.
+        let own = self.spec.anchor.is_none() && !has_reference && list.len() > 1;
         if anchor >= list.len() {
             return Err(RunError::usage(
                 "estimate",
                 "no pose stream is named and the data set has no ground truth",
             ));
         }
-        let Some([x, y, z, qx, qy, qz, qw]) = self.spec.initial_pose else { return Ok(anchor) };
+        let Some([x, y, z, qx, qy, qz, qw]) = self.spec.initial_pose else { return Ok((anchor, own)) };
         if list[anchor].role == Role::Reference {
             return Err(RunError::usage("initial-pose", "places an estimate")
                 .advise("it needs `anchor` estimate or `reference` none"));
@@ -312,15 +330,15 @@ impl Loader<'_> {
             .selection
             .first_keyframe()
             .ok_or_else(|| RunError::usage("initial-pose", "there is no key frame to put it at"))?;
-        let now = list[anchor].trajectory.pose_at(start, self.spec.max_gap).map_err(|e| {
-            RunError::usage(
-                "initial-pose",
-                format!("{} has no pose at the first key frame", list[anchor].name),
-            )
-            .because(e)
-        })?;
-        list[anchor].trajectory = in_other_world(&(wanted * now.inverse()), &list[anchor].trajectory);
-        Ok(anchor)
+        let moved = if own { &mut list[..] } else { &mut list[anchor..=anchor] };
+        for stream in moved {
+            let now = stream.trajectory.pose_at(start, self.spec.max_gap).map_err(|e| {
+                RunError::usage("initial-pose", format!("{} has no pose at the first key frame", stream.name))
+                    .because(e)
+            })?;
+            stream.trajectory = in_other_world(&(wanted * now.inverse()), &stream.trajectory);
+        }
+        Ok((anchor, own))
     }
 }
 

@@ -34,3 +34,4 @@ mod samples;
 mod synthetic;
 mod tracker_oracle;
 mod trajectory_oracle;
+mod verdict;

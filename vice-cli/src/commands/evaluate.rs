@@ -9,10 +9,11 @@ use vice_run::core::metrics::align::Alignment;
 use vice_run::report::html::{IMAGE_BUDGET_BYTES, Run, render};
 use vice_run::report::{self, sample_lines};
 use vice_run::request::Scoring;
+use vice_run::require::{Requirement, broken};
 use vice_run::result::ResultDocument;
 
 use super::report::shots;
-use crate::inputs::EvaluationArgs;
+use crate::inputs::{EvaluationArgs, on_off};
 use crate::outputs::Outputs;
 use crate::terminal::{self, Outcome, Verbosity, usage, with_progress};
 
@@ -24,7 +25,8 @@ use crate::terminal::{self, Outcome, Verbosity, usage, with_progress};
     vice evaluate --request out.json   (asks once more what out.json is the answer to)\n\n\
     Lists repeat the option or take commas. Estimates are names of the data set's streams, `imu-euler` (Euler\n\
     integration of its IMU from the reference state at the first key frame), or files: TUM, EuRoC CSV, KITTI with a\n\
-    times file, and relative motions as rel:FILE.")]
+    times file, and relative motions as rel:FILE.\n\n\
+    Exit code: 0 done, 1 failed, 2 wrong usage, 3 too many labels not scored, 4 a limit of --require is broken.")]
 pub(crate) struct Args {
     #[command(flatten)]
     evaluation: EvaluationArgs,
@@ -41,12 +43,22 @@ struct ScoringArgs {
     /// Numbers of points whose subsets are averaged over [default: those up to 3 that exist].
     #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..), conflicts_with = "request")]
     subsets: Vec<u16>,
-    /// Alignment of the trajectory errors: none, first-pose, yaw, se3, sim3.
-    #[arg(long, value_name = "HOW", default_value = "se3", conflicts_with = "request")]
-    align: Alignment,
+    /// Alignment of the trajectory errors: none, first-pose, yaw, se3, sim3 [default: se3, and first-pose for imu-euler,
+    /// which starts in the reference's own state].
+    #[arg(long, value_name = "HOW", conflicts_with = "request")]
+    align: Option<Alignment>,
+    /// Whether depths at key frames are compared with the recording's depth camera or scan, where these are not asked for
+    /// themselves [default: on].
+    #[arg(long, value_name = "on|off", action = clap::ArgAction::Set, value_parser = on_off, conflicts_with = "request")]
+    depth_check: Option<bool>,
     /// Exit with 3 if more labels than this could not be scored, percent. What an estimate carries behind the camera is warned of instead.
     #[arg(long, value_name = "PERCENT", default_value = "10", value_parser = percent)]
     max_skipped: f64,
+    /// Exit with 4 unless every estimate keeps these limits, such as 'rmse_2d<2px', 'age5s<3px' (five seconds since the key
+    /// frame) or 'moved1m<40mm'; px, mrad or mm. The upper end of the 95 % interval has to be below, with rmse_2d.low and so
+    /// on the lower end. What could not be known breaks a limit.
+    #[arg(long, value_name = "LIMIT,...", value_delimiter = ',')]
+    require: Vec<Requirement>,
 }
 
 /// What is written beside the table.
@@ -95,7 +107,8 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         return Err(usage("--rrd: this vice was built without Rerun; build it with `--features rerun`"));
     }
     let subsets = args.scoring.subsets.iter().map(|n| usize::from(*n)).collect();
-    let request = args.evaluation.request(Scoring { subsets, align: args.scoring.align })?;
+    let mut request = args.evaluation.request(Scoring { subsets, align: args.scoring.align })?;
+    request.depth.compare = args.scoring.depth_check.or(request.depth.compare);
     let outputs = Outputs::new(
         &[&files.json, &files.csv, &files.latex, &files.report, &files.rrd, &samples],
         &request.inputs(),
@@ -136,7 +149,10 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     if !(outputs.write(&texts)? || json_printed) {
         terminal::print(&report::table::render(&document))?;
     }
-    Ok(judge_skips(&document, args.scoring.max_skipped, verbosity))
+    let skips = judge_skips(&document, args.scoring.max_skipped, verbosity);
+    let broken = broken(&args.scoring.require, &document.pixel);
+    broken.iter().for_each(|line| tracing::error!("{line}"));
+    Ok(if broken.is_empty() { skips } else { Outcome::RequirementBroken })
 }
 
 /// Whether enough was scored.

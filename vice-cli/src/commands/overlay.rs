@@ -38,7 +38,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
     let film = is_film(&args.out)?;
-    let request = args.evaluation.request(Scoring { align: Alignment::None, ..Scoring::default() })?;
+    let request = args.evaluation.request(Scoring { align: Some(Alignment::None), ..Scoring::default() })?;
     check_output(args, film, &request)?;
     if request.depth.sources.len() > 1 {
         return Err(usage("--depth: name one source, since a frame shows one place for each stream"));

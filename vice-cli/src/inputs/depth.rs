@@ -57,7 +57,7 @@ pub(crate) struct AnchorArgs {
     pub(crate) max_gap: Span,
 }
 
-fn on_off(text: &str) -> Result<bool, String> {
+pub(crate) fn on_off(text: &str) -> Result<bool, String> {
     match text {
         "on" => Ok(true),
         "off" => Ok(false),
@@ -79,6 +79,7 @@ impl DepthArgs {
             zcam_range_m: self.zcam_range,
             tag_size_m: self.tag_size,
             tag_family: self.tag_family,
+            compare: None,
         })
     }
 

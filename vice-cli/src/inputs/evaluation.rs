@@ -86,8 +86,8 @@ pub(crate) struct LabelArgs {
     /// Only these points.
     #[arg(long, value_name = "NAME,...")]
     points: Vec<String>,
-    /// Whose labels count: all, or only those that a human placed.
-    #[arg(long, value_name = "manual|all", default_value = "all")]
+    /// Whose labels count: those that are not flagged as uncertain, all, or only those that a human placed.
+    #[arg(long, value_name = "certain|manual|all", default_value = "certain")]
     observations: Observations,
 }
 

@@ -35,10 +35,11 @@ pub(crate) struct StreamArgs {
     /// Widest gap between two poses that is interpolated, seconds.
     #[arg(long, value_name = "S", default_value = "0.1", value_parser = span_not_negative)]
     max_gap: Span,
-    /// What places the camera in the world for floor and Z-map depth [default: the reference where there is one].
-    #[arg(long, value_name = "reference|estimate")]
+    /// What places the camera in the world for floor and Z-map depth: reference, estimate (the first), or the name of a
+    /// stream [default: the reference where there is one, else each estimate for itself].
+    #[arg(long, value_name = "reference|estimate|NAME")]
     anchor: Option<Anchor>,
-    /// Pose world_from_body of the anchoring estimate at the first key frame, where its own world has no floor.
+    /// Pose world_from_body of the anchoring estimates at the first key frame, where its own world has no floor.
     #[arg(long, value_name = "X,Y,Z,QX,QY,QZ,QW", allow_hyphen_values = true, value_parser = numbers::<7>)]
     initial_pose: Option<[f64; 7]>,
 }
@@ -59,7 +60,7 @@ impl StreamArgs {
             times: self.times.clone(),
             time_offset: self.time_offset,
             max_gap: self.max_gap,
-            anchor: self.anchor,
+            anchor: self.anchor.clone(),
             initial_pose: self.initial_pose,
         })
     }

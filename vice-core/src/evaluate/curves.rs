@@ -2,29 +2,41 @@
 
 use std::collections::BTreeSet;
 
-use super::streams::{at_both, compare};
+use super::since::since_keyframe;
+use super::streams::{PosesAtFrames, at_both, compare};
 use super::{Evaluation, Stream};
 use crate::frames::WorldFromBody;
 use crate::metrics::align::ReferenceFromEstimate;
 use crate::metrics::associate::PosePairs;
 use crate::metrics::trajectory::ApeErrors;
 use crate::result::{FrameError, PathPart, PathPose, Role, TrajectoryPart};
+use crate::suspicion::Suspicions;
 use crate::time::{Span, Stamp};
 
 /// How many times between the evaluated frames fill a curve.
 const BETWEEN: i64 = 300;
 
-/// The estimates against the reference, where there is one, and the paths of all streams.
-pub(super) fn trajectories(evaluation: &Evaluation<'_>) -> (Vec<TrajectoryPart>, Vec<PathPart>) {
+/// The estimates against the reference, where there is one, and the paths of all streams; what makes the errors
+/// doubtful goes to `suspicions`. `poses` are those of the streams at the selected frames.
+pub(super) fn trajectories(
+    evaluation: &Evaluation<'_>,
+    poses: &[PosesAtFrames],
+    suspicions: &mut Suspicions,
+) -> (Vec<TrajectoryPart>, Vec<PathPart>) {
     let stamps: Vec<Stamp> = evaluation.selection.in_window.iter().map(|f| evaluation.frames[*f]).collect();
     let evaluated: BTreeSet<Stamp> = stamps.iter().copied().collect();
     let shown = if evaluation.keep_samples { shown_stamps(&evaluated) } else { vec![] };
-    let reference = evaluation.streams.iter().find(|s| s.role == Role::Reference);
+    let reference = evaluation.streams.iter().zip(poses).find(|(s, _)| s.role == Role::Reference);
     let (mut parts, mut paths) = (vec![], vec![]);
-    for stream in evaluation.streams {
+    for (stream, poses) in evaluation.streams.iter().zip(poses) {
         let mut transform = None;
-        if let (Some(reference), Role::Estimate) = (reference, stream.role) {
-            let (mut part, found) = compare(reference, stream, &stamps, evaluation.max_gap, evaluation.align);
+        if let (Some((reference, reference_poses)), Role::Estimate) = (reference, stream.role) {
+            let (mut part, found, doubts) =
+                compare(reference, stream, &stamps, evaluation.max_gap, evaluation.align);
+            suspicions.extend(doubts);
+            if evaluation.keep_samples {
+                part.since_keyframe = since_keyframe(evaluation, reference_poses, poses);
+            }
             if let Some(found) = &found {
                 part.frames = frame_errors(evaluation, (reference, stream), found, &shown, &evaluated);
             }

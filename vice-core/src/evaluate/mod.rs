@@ -10,27 +10,33 @@
 //! No image is decoded on the way.
 
 mod curves;
+mod depth_doubts;
+mod depths;
+mod path_doubts;
 mod score;
 mod select;
+mod since;
 mod sparse;
+mod spread;
 mod streams;
 pub(crate) mod trial;
-
-use std::collections::BTreeMap;
-
-use rayon::prelude::*;
 
 pub use select::{Observations, SelectedKeyframe, Selection, Window};
 pub use streams::Stream;
 
-use crate::camera::{Camera, Pixel};
+use depth_doubts::{OtherDepths, depth_doubts};
+use depths::{DepthTable, SourceDepths, keyframe_depths, pixel_key};
+use score::Scorer;
+use streams::PosesAtFrames;
+
+use crate::camera::Camera;
 use crate::dataset::Dataset;
-use crate::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
+use crate::depth::DepthSource;
 use crate::error::{DataError, DataResult};
 use crate::frames::BodyFromCamera;
 use crate::metrics::align::Alignment;
 use crate::metrics::pixel::{pooled_rmse_px, subset_rmse_px};
-use crate::result::{DatasetPart, Evaluated, PixelPart, PointName, Sample, Skip};
+use crate::result::{DatasetPart, Evaluated, PixelPart, PointName, Role, Sample, Skip};
 use crate::skip::SkipReason;
 use crate::suspicion::Suspicions;
 use crate::time::{Span, Stamp};
@@ -84,6 +90,9 @@ pub enum EvaluateError {
     /// No key frame is manual.
     #[error("no key frame is manual, so that no manual label can be scored by itself")]
     NoManualKeyframe,
+    /// Every key frame is flagged as uncertain.
+    #[error("every key frame is flagged as uncertain, so that no label can be scored")]
+    NoCertainKeyframe,
     /// More points are asked for than there are.
     #[error("subsets of {asked} points were asked for, but there are {points} points")]
     SubsetTooLarge {
@@ -132,8 +141,13 @@ pub struct Evaluation<'a> {
     pub streams: &'a [Stream],
     /// Index of the stream that places the camera for depth.
     pub anchor: usize,
+    /// Each stream places the camera for its own depth: without a reference none of them is better known than the
+    /// others, and the order in which they are listed must not matter.
+    pub own_anchors: bool,
     /// The depth sources.
     pub depths: &'a [&'a dyn DepthSource],
+    /// Further sources, which nothing is scored with: their depths at the key frames are compared.
+    pub checks: &'a [&'a dyn DepthSource],
     /// Widest gap between two poses that is interpolated.
     pub max_gap: Span,
     /// Subset sizes; `None` for those up to 3 that exist.
@@ -142,16 +156,6 @@ pub struct Evaluation<'a> {
     pub align: Alignment,
     /// Whether the document lists the scored samples.
     pub keep_samples: bool,
-}
-
-/// Depths of the pixels at the key frames of one source, by frame and pixel bits.
-type DepthTable = BTreeMap<(usize, PixelKey), Result<DepthSample, DepthMiss>>;
-
-/// A pixel as a key: two labels at the same place are one question.
-type PixelKey = (u64, u64);
-
-fn pixel_key(px: Pixel) -> PixelKey {
-    (px.u.to_bits(), px.v.to_bits())
 }
 
 /// Takes the scored samples of one point, of the pose stream and depth source that are named.
@@ -202,37 +206,98 @@ fn run(
         .map(|s| s.poses_at(evaluation.frames, &selection.frames, evaluation.max_gap))
         .collect();
 
-    let total = evaluation.depths.len() * (1 + evaluation.streams.len());
+    // How far the camera moved is the reference's word, where there is one: an estimate may have another scale.
+    let reference = evaluation.streams.iter().position(|s| s.role == Role::Reference);
+    let path_m = reference.map(|stream| spread::path_m(&poses[stream], &cameras));
+
+    let mut suspicions = Suspicions::new();
+    let placing: Vec<&PosesAtFrames> = match evaluation.own_anchors {
+        true => poses.iter().collect(),
+        false => vec![&poses[evaluation.anchor]],
+    };
+    let sources = evaluation.depths.len() + evaluation.checks.len();
+    let total = sources + evaluation.depths.len() * evaluation.streams.len();
     let mut done = 0;
-    let mut pixel = Vec::new();
-    for source in evaluation.depths {
-        let depths = keyframe_depths(evaluation, *source, &cameras, &poses[evaluation.anchor])?;
+    let mut step = || {
         done += 1;
         progress(done, total);
-        for (stream, poses) in evaluation.streams.iter().zip(&poses) {
+    };
+    let mut known = Vec::with_capacity(sources);
+    for source in evaluation.depths {
+        known.push(SourceDepths::ask(evaluation, *source, &cameras, &placing)?);
+        step();
+    }
+    for source in evaluation.checks {
+        match SourceDepths::ask(evaluation, *source, &cameras, &placing) {
+            Ok(depths) => known.push(depths),
+            Err(error) => suspicions.add(depths::check_failed(*source, &error)),
+        }
+        step();
+    }
+    let mut pixel = Vec::new();
+    for (place, source) in evaluation.depths.iter().enumerate() {
+        // Depths are shared, so that one look by the best motion there is, the reference's, is enough.
+        let mut by_reference = None;
+        for (index, (stream, poses)) in evaluation.streams.iter().zip(&poses).enumerate() {
             let to_sink: Option<score::TakePoint<'_>> = match &mut sink {
                 Some(sink) => Some(&mut |samples| sink(&stream.name, source.name(), samples)),
                 None => None,
             };
-            let scored = score::score(evaluation, &cameras, poses, &depths, to_sink)
-                .map_err(EvaluateError::Samples)?;
+            let scorer = Scorer {
+                evaluation,
+                cameras: &cameras,
+                poses,
+                depths: known[place].of(index),
+                keep_samples: evaluation.keep_samples || to_sink.is_some(),
+                carries: true,
+            };
+            let scored = score::score(&scorer, to_sink).map_err(EvaluateError::Samples)?;
             let rmse_px = subset_rmse_px(&scored.errors, &sizes);
+            let moved_m = path_m.as_ref().map_or_else(|| spread::path_m(poses, &cameras), Clone::clone);
+            let spread = spread::spread(evaluation, &scored, &moved_m);
+            let samples = scored.errors.iter().map(|e| e.count).sum();
+            let about = format!("{}, {} depth", stream.name, source.name());
+            suspicions.extend(spread::suspicions(&about, &spread, samples));
+            let doubts = match &by_reference {
+                Some(doubts) => Vec::clone(doubts),
+                None => {
+                    let (doubts, common) = depth_doubts(&scorer, &others(&known, place, index));
+                    let own = reference.is_none().then_some(stream.name.as_str());
+                    let keyframes = scored.keyframes.len();
+                    suspicions.extend(depth_doubts::suspicions(
+                        source.name(),
+                        own,
+                        &doubts,
+                        keyframes,
+                        common,
+                    ));
+                    doubts
+                }
+            };
+            if Some(index) == reference {
+                by_reference = Some(doubts.clone());
+            }
             pixel.push(PixelPart {
                 stream: stream.name.clone(),
                 role: stream.role,
                 depth: source.name().to_string(),
                 rmse_px,
                 pooled_rmse_px: pooled_rmse_px(&scored.errors),
-                scored: scored.errors.iter().map(|e| e.count).sum(),
+                held_rmse_px: spread.held_rmse_px,
+                interval_95: spread.interval_95,
+                held: spread.held,
+                by_age: spread.by_age,
+                by_distance: spread.by_distance,
+                scored: samples,
                 skipped: scored.skipped,
                 keyframes: scored.keyframes,
+                depth_doubts: doubts,
                 samples: scored.samples,
             });
-            done += 1;
-            progress(done, total);
+            step();
         }
     }
-    let (trajectory, paths) = curves::trajectories(evaluation);
+    let (trajectory, paths) = curves::trajectories(evaluation, &poses, &mut suspicions);
     Ok(Evaluated {
         dataset: DatasetPart {
             name: evaluation.dataset.name().to_string(),
@@ -244,18 +309,25 @@ fn run(
         pixel,
         trajectory,
         paths,
-        suspicions: suspicions(evaluation),
+        suspicions: all_suspicions(evaluation, suspicions),
     })
 }
 
-/// What looked wrong in the data, the depth sources and the pose streams, each said once.
-fn suspicions(evaluation: &Evaluation<'_>) -> Suspicions {
+/// What looked wrong in the data, the depth sources and the pose streams, each said once. Asked when all was read.
+fn all_suspicions(evaluation: &Evaluation<'_>, found: Suspicions) -> Suspicions {
     let mut list: Suspicions = evaluation.dataset.suspicions().into_iter().collect();
     list.extend(evaluation.depths.iter().flat_map(|source| source.suspicions()));
     list.extend(evaluation.streams.iter().filter_map(|stream| {
         sparse::suspicion(stream, evaluation.selection, evaluation.frames, evaluation.max_gap)
     }));
+    list.extend(found);
     list
+}
+
+/// The sources that a source's depths are compared with: all others that measure.
+fn others<'a>(known: &'a [SourceDepths<'a>], place: usize, stream: usize) -> Vec<OtherDepths<'a>> {
+    let others = known.iter().enumerate().filter(|(i, k)| *i != place && !k.source.is_assumed());
+    others.map(|(_, k)| OtherDepths { source: k.source, depths: k.of(stream) }).collect()
 }
 
 fn subset_sizes(asked: Option<&[usize]>, points: usize) -> Result<Vec<usize>, EvaluateError> {
@@ -290,45 +362,6 @@ fn extrinsics(evaluation: &Evaluation<'_>) -> DataResult<Vec<Option<BodyFromCame
         }
         None => Ok(found),
     }
-}
-
-/// Asks one source for the depths of all key-frame pixels, key frames in parallel.
-fn keyframe_depths(
-    evaluation: &Evaluation<'_>,
-    source: &dyn DepthSource,
-    cameras: &[Option<BodyFromCamera>],
-    anchor: &streams::PosesAtFrames,
-) -> Result<DepthTable, EvaluateError> {
-    let mut pixels: BTreeMap<usize, BTreeMap<PixelKey, Pixel>> = BTreeMap::new();
-    for segment in evaluation.selection.points.iter().flat_map(|p| &p.segments) {
-        let px = segment.keyframe.observation.px;
-        pixels.entry(segment.keyframe.frame).or_default().insert(pixel_key(px), px);
-    }
-    let asked: Vec<(usize, BTreeMap<PixelKey, Pixel>)> = pixels.into_iter().collect();
-    let answers: Vec<DataResult<Vec<_>>> = asked
-        .par_iter()
-        .map(|(frame, pixels)| {
-            let at = position(&evaluation.selection.frames, *frame);
-            let Some(body_from_camera) = cameras[at] else { return Ok(vec![]) };
-            let stamp = evaluation.frames[*frame];
-            let keyframe = Keyframe {
-                stamp,
-                frame: *frame,
-                camera: evaluation.camera,
-                body_from_camera,
-                world_from_camera: anchor[at].ok().map(|pose| pose * body_from_camera),
-                floor: evaluation.dataset.floor(stamp)?,
-            };
-            let list: Vec<Pixel> = pixels.values().copied().collect();
-            let depths = source.depths(&keyframe, &list)?;
-            Ok(pixels.keys().zip(depths).map(|(key, depth)| ((*frame, *key), depth)).collect())
-        })
-        .collect();
-    let mut table = DepthTable::new();
-    for answer in answers {
-        table.extend(answer?);
-    }
-    Ok(table)
 }
 
 /// Position of a frame among the selected ones, which hold every frame that a segment names.

@@ -1,11 +1,14 @@
 //! Tracking and scoring of the labels of one pose stream with one depth source.
 
+use nalgebra::Point3;
 use rayon::prelude::*;
 
-use super::select::{SelectedPoint, SelectedSegment};
+use super::select::{Matched, SelectedPoint, SelectedSegment};
 use super::streams::PosesAtFrames;
 use super::{DepthTable, Evaluation, SkipReason, pixel_key, position, skip};
-use crate::frames::{BodyFromCamera, WorldFromCamera};
+use crate::camera::Pixel;
+use crate::frames::{self, BodyFromCamera, Rigid, WorldFromCamera};
+use crate::metrics::held::{Carried, CarriedSegment};
 use crate::metrics::pixel::SquaredErrors;
 use crate::result::{KeyframePart, PointName, Sample, Skip};
 use crate::track::{lift, track};
@@ -17,10 +20,13 @@ pub(super) struct Scored {
     pub(super) samples: Vec<Sample>,
     pub(super) skipped: Vec<Skip>,
     pub(super) keyframes: Vec<KeyframePart>,
+    /// What was carried of each segment with a sample, where that is asked for.
+    pub(super) carried: Vec<CarriedSegment>,
 }
 
 #[derive(Default)]
 struct ScoredPoint {
+    carried: Vec<CarriedSegment>,
     errors: SquaredErrors,
     samples: Vec<Sample>,
     skipped: Vec<Skip>,
@@ -37,18 +43,12 @@ pub(super) type TakePoint<'a> = &'a mut dyn FnMut(&[Sample]) -> std::io::Result<
 ///
 /// # Errors
 /// Those of the sink.
-pub(super) fn score(
-    evaluation: &Evaluation<'_>,
-    cameras: &[Option<BodyFromCamera>],
-    poses: &PosesAtFrames,
-    depths: &DepthTable,
-    mut sink: Option<TakePoint<'_>>,
-) -> std::io::Result<Scored> {
-    let keep_samples = evaluation.keep_samples || sink.is_some();
-    let scorer = Scorer { evaluation, cameras, poses, depths, keep_samples };
+pub(super) fn score(scorer: &Scorer<'_>, mut sink: Option<TakePoint<'_>>) -> std::io::Result<Scored> {
     let mut all = Scored::default();
-    for some in evaluation.selection.points.chunks(POINTS_AT_A_TIME) {
-        let points: Vec<ScoredPoint> = some.par_iter().map(|point| scorer.point(point)).collect();
+    for (chunk, some) in scorer.evaluation.selection.points.chunks(POINTS_AT_A_TIME).enumerate() {
+        let first = chunk * POINTS_AT_A_TIME;
+        let one = |(place, point): (usize, &SelectedPoint<'_>)| scorer.point(first + place, point);
+        let points: Vec<ScoredPoint> = some.par_iter().enumerate().map(one).collect();
         for point in points {
             all.errors.push(point.errors);
             match &mut sink {
@@ -57,26 +57,31 @@ pub(super) fn score(
             }
             all.skipped.extend(point.skipped);
             all.keyframes.extend(point.keyframes);
+            all.carried.extend(point.carried);
         }
     }
     Ok(all)
 }
 
-struct Scorer<'a> {
-    evaluation: &'a Evaluation<'a>,
-    cameras: &'a [Option<BodyFromCamera>],
-    poses: &'a PosesAtFrames,
-    depths: &'a DepthTable,
-    keep_samples: bool,
+/// What one stream with one depth source is scored with.
+pub(super) struct Scorer<'a> {
+    pub(super) evaluation: &'a Evaluation<'a>,
+    pub(super) cameras: &'a [Option<BodyFromCamera>],
+    pub(super) poses: &'a PosesAtFrames,
+    pub(super) depths: &'a DepthTable,
+    /// Whether samples are listed, or handed on.
+    pub(super) keep_samples: bool,
+    /// Whether residuals are kept by segment, in a few bytes each.
+    pub(super) carries: bool,
 }
 
 impl Scorer<'_> {
-    fn point(&self, point: &SelectedPoint<'_>) -> ScoredPoint {
+    fn point(&self, place: usize, point: &SelectedPoint<'_>) -> ScoredPoint {
         let name = PointName(point.name.clone());
         let mut scored = ScoredPoint::default();
         scored.skipped.extend(point.skips.iter().map(|(stamp, reason)| skip(&name, *stamp, *reason)));
         for segment in &point.segments {
-            if let Err(reason) = self.segment(segment, &name, &mut scored) {
+            if let Err(reason) = self.segment(segment, (place, &name), &mut scored) {
                 let stamps = segment.samples.iter().map(|s| s.observation.stamp);
                 scored.skipped.extend(stamps.map(|stamp| skip(&name, stamp, reason)));
             }
@@ -89,7 +94,7 @@ impl Scorer<'_> {
     fn segment(
         &self,
         segment: &SelectedSegment<'_>,
-        name: &PointName,
+        (place, name): (usize, &PointName),
         scored: &mut ScoredPoint,
     ) -> Result<(), SkipReason> {
         let camera = self.evaluation.camera;
@@ -110,6 +115,8 @@ impl Scorer<'_> {
             point_world_m: Some(at_keyframe.transform_point(&point_camera_m).coords.into()),
             on_edge: depth.on_edge,
         });
+        let mut carried =
+            CarriedSegment { point: place, keyframe: self.at(keyframe.frame), samples: Vec::new() };
         for sample in &segment.samples {
             let label = sample.observation;
             let tracked = self.world_from_camera(sample.frame).and_then(|now| {
@@ -119,6 +126,10 @@ impl Scorer<'_> {
                 Ok(tracked_px) => {
                     let error_px = tracked_px.distance_px(label.px);
                     scored.errors.add(error_px);
+                    if self.carries {
+                        let motion = (&at_keyframe, sample.frame);
+                        carried.samples.push(self.carried(sample, motion, &point_camera_m, tracked_px));
+                    }
                     if self.keep_samples {
                         scored.samples.push(Sample {
                             point: name.clone(),
@@ -132,10 +143,42 @@ impl Scorer<'_> {
                 Err(reason) => scored.skipped.push(skip(name, label.stamp, reason)),
             }
         }
+        if !carried.samples.is_empty() {
+            scored.carried.push(carried);
+        }
         Ok(())
     }
 
-    fn world_from_camera(&self, frame: usize) -> Result<WorldFromCamera, SkipReason> {
+    /// The residual of a sample, in pixels, as an angle, and at its depth.
+    fn carried(
+        &self,
+        sample: &Matched<'_>,
+        (at_keyframe, frame): (&WorldFromCamera, usize),
+        point_camera_m: &Point3<f64>,
+        tracked_px: Pixel,
+    ) -> Carried {
+        let label = sample.observation.px;
+        let mut carried = Carried {
+            frame: self.at(frame),
+            residual_px: [tracked_px.u - label.u, tracked_px.v - label.v],
+            angle_rad: f32::NAN,
+            offset_m: f32::NAN,
+        };
+        if let (Ok(now), Ok(ray)) = (self.world_from_camera(frame), self.evaluation.camera.unproject(label)) {
+            let now_from_keyframe: Rigid<frames::Camera, frames::Camera> = now.inverse() * *at_keyframe;
+            let point_m = now_from_keyframe.transform_point(point_camera_m).coords;
+            carried.angle_rad = point_m.cross(&ray).norm().atan2(point_m.dot(&ray)) as f32;
+            carried.offset_m = (point_m - point_m.z * ray).norm() as f32;
+        }
+        carried
+    }
+
+    /// Place of a frame among the selected ones.
+    fn at(&self, frame: usize) -> u32 {
+        u32::try_from(position(&self.evaluation.selection.frames, frame)).unwrap_or(u32::MAX)
+    }
+
+    pub(super) fn world_from_camera(&self, frame: usize) -> Result<WorldFromCamera, SkipReason> {
         let at = position(&self.evaluation.selection.frames, frame);
         let world_from_body = self.poses[at].map_err(SkipReason::of_frame)?;
         let body_from_camera = self.cameras[at].ok_or(SkipReason::NoExtrinsics)?;

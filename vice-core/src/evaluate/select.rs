@@ -28,8 +28,11 @@ pub struct Window {
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Observations {
-    /// All, whoever made them.
+    /// Those that whoever made them is sure of. A segment whose key frame is flagged as uncertain is left out as a
+    /// whole: all of it would be carried from a doubtful place.
     #[default]
+    Certain,
+    /// All, whoever made them and however sure.
     All,
     /// Only those that a human placed: no number depends on another one. A segment whose key frame a machine made is
     /// left out as a whole, since what its point is would be the machine's word.
@@ -40,13 +43,23 @@ impl Observations {
     /// The name in options and documents.
     pub const fn name(self) -> &'static str {
         match self {
+            Self::Certain => "certain",
             Self::All => "all",
             Self::Manual => "manual",
         }
     }
 
-    fn count(self, observation: &Observation) -> bool {
-        self == Self::All || observation.source == ObservationSource::Manual
+    /// Why a label does not count, as a sample and as a key frame; `None` where it does.
+    fn leaves_out(self, observation: &Observation) -> Option<(SkipReason, SkipReason)> {
+        match self {
+            Self::Certain if observation.uncertain => {
+                Some((SkipReason::Uncertain, SkipReason::KeyframeUncertain))
+            }
+            Self::Manual if observation.source != ObservationSource::Manual => {
+                Some((SkipReason::NotManual, SkipReason::KeyframeNotManual))
+            }
+            _ => None,
+        }
     }
 }
 
@@ -55,9 +68,10 @@ impl std::str::FromStr for Observations {
 
     fn from_str(text: &str) -> Result<Self, String> {
         match text {
+            "certain" => Ok(Self::Certain),
             "all" => Ok(Self::All),
             "manual" => Ok(Self::Manual),
-            _ => Err("expected manual or all".to_string()),
+            _ => Err("expected certain, manual or all".to_string()),
         }
     }
 }
@@ -167,6 +181,8 @@ impl<'a> Selection<'a> {
             for segment in point.segments() {
                 let keyframe = finder.find(segment.keyframe.stamp);
                 at_a_frame |= keyframe.is_some();
+                let keyframe_left_out =
+                    window.observations.leaves_out(segment.keyframe).map(|(_, reason)| reason);
                 let mut samples = Vec::new();
                 for observation in segment.rest {
                     let frame = finder.find(observation.stamp);
@@ -174,22 +190,21 @@ impl<'a> Selection<'a> {
                     if !kept.covers(observation.stamp) {
                         continue;
                     }
-                    match (frame, keyframe) {
-                        (None, _) => selected.skips.push((observation.stamp, SkipReason::NoFrame)),
-                        (Some(frame), _) if !kept.has(frame) => {}
-                        (Some(_), _) if !window.observations.count(observation) => {
-                            selected.skips.push((observation.stamp, SkipReason::NotManual));
-                        }
-                        (Some(_), None) => {
-                            selected.skips.push((observation.stamp, SkipReason::KeyframeNoFrame))
-                        }
-                        (Some(_), _) if observation.occluded => {
-                            selected.skips.push((observation.stamp, SkipReason::Occluded));
-                        }
-                        (Some(_), _) if !window.observations.count(segment.keyframe) => {
-                            selected.skips.push((observation.stamp, SkipReason::KeyframeNotManual));
-                        }
-                        (Some(frame), Some(_)) => samples.push(Matched { observation, frame }),
+                    let Some(frame) = frame else {
+                        selected.skips.push((observation.stamp, SkipReason::NoFrame));
+                        continue;
+                    };
+                    if !kept.has(frame) {
+                        continue;
+                    }
+                    let left_out = window.observations.leaves_out(observation).map(|(reason, _)| reason);
+                    let reason = left_out
+                        .or_else(|| keyframe.is_none().then_some(SkipReason::KeyframeNoFrame))
+                        .or_else(|| observation.occluded.then_some(SkipReason::Occluded))
+                        .or(keyframe_left_out);
+                    match reason {
+                        Some(reason) => selected.skips.push((observation.stamp, reason)),
+                        None => samples.push(Matched { observation, frame }),
                     }
                 }
                 let Some(frame) = keyframe else {
@@ -198,8 +213,7 @@ impl<'a> Selection<'a> {
                     }
                     continue;
                 };
-                if samples.is_empty()
-                    && !(kept.covers(segment.keyframe.stamp) && window.observations.count(segment.keyframe))
+                if samples.is_empty() && !(kept.covers(segment.keyframe.stamp) && keyframe_left_out.is_none())
                 {
                     continue;
                 }
@@ -217,10 +231,13 @@ impl<'a> Selection<'a> {
         if selection.frames.is_empty() {
             let mut keyframes =
                 labels.points().iter().flat_map(|p| &p.observations).filter(|o| o.keyframe).peekable();
-            if keyframes.peek().is_some() && !keyframes.any(|o| window.observations.count(o)) {
-                return Err(EvaluateError::NoManualKeyframe);
+            if keyframes.peek().is_some() && !keyframes.any(|o| window.observations.leaves_out(o).is_none()) {
+                return Err(match window.observations {
+                    Observations::Manual => EvaluateError::NoManualKeyframe,
+                    _ => EvaluateError::NoCertainKeyframe,
+                });
             }
-            let all = Window { observations: Observations::All, ..*window };
+            let all = Window { observations: Observations::default(), ..*window };
             return Err(if all != Window::default() {
                 EvaluateError::EmptyWindow
             } else {

@@ -1,11 +1,13 @@
 //! Pose streams at the evaluated frames, and an estimate against the reference there.
 
 use super::EvaluateError;
+use super::path_doubts::path_doubts;
 use crate::frames::WorldFromBody;
 use crate::metrics::align::{Alignment, ReferenceFromEstimate, align};
 use crate::metrics::associate::PosePairs;
 use crate::metrics::trajectory::Summary;
 use crate::result::{Role, TrajectoryPart};
+use crate::suspicion::Suspicion;
 use crate::time::{Span, Stamp};
 use crate::time_unit::mixed_up;
 use crate::trajectory::{NoPose, Trajectory};
@@ -21,6 +23,9 @@ pub struct Stream {
     pub trajectory: Trajectory,
     /// The clock offset that was added to its stamps.
     pub time_offset: Span,
+    /// How its trajectory errors are aligned, where that is not the evaluation's way: a stream that starts in the
+    /// reference's own state is in its world already.
+    pub align: Option<Alignment>,
 }
 
 /// A pose for each selected frame, or why there is none.
@@ -29,7 +34,7 @@ pub(crate) type PosesAtFrames = Vec<Result<WorldFromBody, NoPose>>;
 impl Stream {
     /// A stream with its stamps as they are.
     pub fn new(name: impl Into<String>, role: Role, trajectory: Trajectory) -> Self {
-        Self { name: name.into(), role, trajectory, time_offset: Span::ZERO }
+        Self { name: name.into(), role, trajectory, time_offset: Span::ZERO, align: None }
     }
 
     pub(super) fn poses_at(&self, frames: &[Stamp], selected: &[usize], max_gap: Span) -> PosesAtFrames {
@@ -53,7 +58,8 @@ pub(super) fn compare(
     stamps: &[Stamp],
     max_gap: Span,
     alignment: Alignment,
-) -> (TrajectoryPart, Option<ReferenceFromEstimate>) {
+) -> (TrajectoryPart, Option<ReferenceFromEstimate>, Vec<Suspicion>) {
+    let alignment = estimate.align.unwrap_or(alignment);
     let at_both = at_both(reference, estimate, stamps, max_gap);
     let mut part = TrajectoryPart {
         estimate: estimate.name.clone(),
@@ -65,7 +71,9 @@ pub(super) fn compare(
         roe_rad: None,
         problem: None,
         frames: vec![],
+        since_keyframe: vec![],
     };
+    let doubts = path_doubts(&estimate.name, &at_both, alignment);
     let found = PosePairs::new(at_both).and_then(|pairs| {
         let transform = align(&pairs, alignment, None)?;
         Ok((Summary::of(&transform.apply_to(&pairs))?, transform))
@@ -75,11 +83,11 @@ pub(super) fn compare(
             part.rmse_3d_m = Some(summary.rmse_3d_m);
             part.aoe_rad = Some(summary.aoe_rad);
             part.roe_rad = summary.roe_rad;
-            (part, Some(transform))
+            (part, Some(transform), doubts)
         }
         Err(error) => {
             part.problem = Some(error.to_string());
-            (part, None)
+            (part, None, vec![])
         }
     }
 }

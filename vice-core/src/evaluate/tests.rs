@@ -6,12 +6,15 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::camera::Model;
+use crate::camera::{Model, Pixel};
 use crate::dataset::{Floor, Image};
+use crate::depth::{DepthMiss, DepthSample, Keyframe};
 use crate::frames::{Body, Rigid, World, WorldFromBody};
 use crate::label::{LabelRow, LabelSet, Observation, ObservationSource};
 use crate::result::Role;
 use crate::trajectory::{Trajectory, in_other_world};
+
+mod verdict;
 
 struct Flyer {
     camera: Camera,
@@ -127,9 +130,18 @@ fn stream(role: Role, trajectory: Trajectory) -> Stream {
 }
 
 fn run(labels: &LabelSet, streams: &[Stream], window: Window) -> Result<Evaluated, EvaluateError> {
+    run_with(labels, streams, window, |evaluation| evaluate(&evaluation, &|_, _| {}))
+}
+
+fn run_with<T>(
+    labels: &LabelSet,
+    streams: &[Stream],
+    window: Window,
+    work: impl FnOnce(Evaluation<'_>) -> Result<T, EvaluateError>,
+) -> Result<T, EvaluateError> {
     let flyer = flyer();
     let selection = Selection::new(labels, &flyer.frames, &flyer.camera, &window)?;
-    let evaluation = Evaluation {
+    work(Evaluation {
         dataset: &flyer,
         camera_name: "cam0",
         camera: &flyer.camera,
@@ -137,13 +149,14 @@ fn run(labels: &LabelSet, streams: &[Stream], window: Window) -> Result<Evaluate
         selection: &selection,
         streams,
         anchor: 0,
+        own_anchors: false,
         depths: &[&FloorOfTest],
+        checks: &[],
         max_gap: Span::from_millis(100),
         subsets: None,
         align: Alignment::Se3,
         keep_samples: true,
-    };
-    evaluate(&evaluation, &|_, _| {})
+    })
 }
 
 #[test]

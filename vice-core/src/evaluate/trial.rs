@@ -1,6 +1,6 @@
 //! A stream scored once more with another camera and other poses, by the same stages: what a diagnosis varies.
 
-use super::score::score;
+use super::score::{Scorer, score};
 pub(crate) use super::streams::PosesAtFrames;
 use super::{DepthTable, EvaluateError, Evaluation, extrinsics, keyframe_depths};
 use crate::camera::Camera;
@@ -73,8 +73,10 @@ impl<'a> Trial<'a> {
         depths: &TrialDepths,
     ) -> Vec<Sample> {
         // Only a sink can fail, and there is none.
-        score(&self.with(camera), cameras, poses, &depths.0, None)
-            .map_or_else(|_| Vec::new(), |all| all.samples)
+        let evaluation = &self.with(camera);
+        let depths = &depths.0;
+        let scorer = Scorer { evaluation, cameras, poses, depths, keep_samples: true, carries: false };
+        score(&scorer, None).map_or_else(|_| Vec::new(), |all| all.samples)
     }
 
     fn with<'b>(&'b self, camera: &'b Camera) -> Evaluation<'b> {
@@ -87,7 +89,9 @@ impl<'a> Trial<'a> {
             selection: e.selection,
             streams: e.streams,
             anchor: e.anchor,
+            own_anchors: e.own_anchors,
             depths: e.depths,
+            checks: &[],
             max_gap: e.max_gap,
             subsets: None,
             align: Alignment::None,

@@ -2,9 +2,13 @@
 
 pub mod align;
 pub mod associate;
+pub mod by_age;
+pub mod held;
+pub mod interval;
 pub mod pixel;
 pub mod plane;
 pub mod quaternion_order;
 pub mod rotation_offset;
 pub mod rpe;
+pub mod student;
 pub mod trajectory;

@@ -24,6 +24,12 @@ const STEP_SPACINGS: f64 = 3.0;
 /// The same over the standard deviation across the surface.
 const STEP_NOISE: f64 = 4.0;
 
+/// Corners of a triangle whose depths differ by more than this part of the nearer one may straddle an edge.
+const EDGE: f64 = 0.05;
+
+/// The part of a step that refuses a triangle from which on it flags one, where steps are refused.
+const FLAG_SHARE: f64 = 0.5;
+
 /// Faces that a thread fills in one go.
 const FACES_AT_ONCE: usize = 1 << 10;
 
@@ -34,8 +40,10 @@ type Answer = Result<DepthSample, DepthMiss>;
 pub(super) struct Limits<'a> {
     /// Longest edge, pixels.
     pub(super) width_px: f64,
-    /// Where its patches come from, if a triangle across an occlusion edge is to be told.
-    pub(super) edges_of: Option<&'a View<'a>>,
+    /// Where its patches come from.
+    pub(super) view: &'a View<'a>,
+    /// Whether a triangle across an occlusion edge is refused; else it is only flagged.
+    pub(super) refuses_edges: bool,
 }
 
 /// A corner of the triangulation, and which point it is.
@@ -148,12 +156,12 @@ impl<'a> Surface<'a> {
         for corners in corners {
             let mut known = None;
             queries.covered_by(corners.map(|c| c.0), |i, px| {
-                let (triangle, unfit) = known.get_or_insert_with(|| {
+                let (triangle, fit) = known.get_or_insert_with(|| {
                     let triangle = self.triangle(corners.map(|c| c.1));
-                    let unfit = triangle.unfit(&self.limits);
-                    (triangle, unfit)
+                    let fit = triangle.fit(&self.limits);
+                    (triangle, fit)
                 });
-                hits.push((i, unfit.map_or_else(|| Ok(triangle.at(px)), Err)));
+                hits.push((i, fit.map(|on_edge| triangle.at(px, on_edge))));
             });
         }
         hits
@@ -190,39 +198,56 @@ impl Triangle {
 
     /// Depth of a pixel, or why there is none.
     fn depth(&self, limits: &Limits<'_>, at: Pixel) -> Answer {
-        self.unfit(limits).map_or_else(|| Ok(self.at(at)), Err)
+        self.fit(limits).map(|on_edge| self.at(at, on_edge))
     }
 
     /// Depth on the plane through the corners.
-    fn at(&self, px: Pixel) -> DepthSample {
+    fn at(&self, px: Pixel, on_edge: bool) -> DepthSample {
         let [a, b, c] = self.corners;
         let z_m = a.z_m + self.slope[0] * (px.u - a.u) + self.slope[1] * (px.v - a.v);
         // A needle of a triangle has next to no area to divide by.
         let (low, high) = (a.z_m.min(b.z_m).min(c.z_m), a.z_m.max(b.z_m).max(c.z_m));
-        DepthSample::new(if z_m.is_finite() { z_m.clamp(low, high) } else { low })
+        DepthSample { z_m: if z_m.is_finite() { z_m.clamp(low, high) } else { low }, on_edge }
     }
 
-    fn unfit(&self, limits: &Limits<'_>) -> Option<DepthMiss> {
+    /// Whether its corners straddle a depth edge; or why it is unfit to interpolate in.
+    fn fit(&self, limits: &Limits<'_>) -> Result<bool, DepthMiss> {
         let pairs = [(0, 1), (1, 2), (2, 0)];
         let too_wide = |(i, j): (usize, usize)| {
             let (a, b) = (self.corners[i], self.corners[j]);
             (a.u - b.u).powi(2) + (a.v - b.v).powi(2) > limits.width_px.powi(2)
         };
         if pairs.into_iter().any(too_wide) {
-            return Some(DepthMiss::TriangleTooWide);
+            return Err(DepthMiss::TriangleTooWide);
         }
-        let view = limits.edges_of?;
-        let sides = self.corners.map(|c| (in_camera(&c), view.patch(c.leaf)));
-        let step = |(i, j): (usize, usize)| apart(&sides[i], &sides[j]) || apart(&sides[j], &sides[i]);
-        pairs.into_iter().any(step).then_some(DepthMiss::OcclusionEdge)
+        let [a, b, c] = self.corners;
+        let (low, high) = (a.z_m.min(b.z_m).min(c.z_m), a.z_m.max(b.z_m).max(c.z_m));
+        let jumps = high > low * (1.0 + EDGE);
+        if !(jumps || limits.refuses_edges) {
+            return Ok(false);
+        }
+        let sides = self.corners.map(|c| (in_camera(&c), limits.view.patch(c.leaf)));
+        let step = |share: f64| {
+            let one = |(i, j): (usize, usize)| {
+                apart(&sides[i], &sides[j], share) || apart(&sides[j], &sides[i], share)
+            };
+            pairs.into_iter().any(one)
+        };
+        if !limits.refuses_edges {
+            return Ok(step(1.0));
+        }
+        if step(1.0) {
+            return Err(DepthMiss::OcclusionEdge);
+        }
+        Ok(jumps && step(FLAG_SHARE))
     }
 }
 
-/// Whether a point lies off the patch of another by more than sampling and noise explain.
-fn apart(a: &(nalgebra::Vector3<f64>, Facing), b: &(nalgebra::Vector3<f64>, Facing)) -> bool {
+/// Whether a point lies off the patch of another by more than this share of what sampling and noise explain.
+fn apart(a: &(nalgebra::Vector3<f64>, Facing), b: &(nalgebra::Vector3<f64>, Facing), share: f64) -> bool {
     let off_m = a.1.normal.dot(&(b.0 - a.0)).abs();
     let spacing_m = a.1.spacing_m.max(b.1.spacing_m);
-    off_m > STEP_SPACINGS * spacing_m + STEP_NOISE * a.1.thickness_m
+    off_m > share * (STEP_SPACINGS * spacing_m + STEP_NOISE * a.1.thickness_m)
 }
 
 fn in_camera(seen: &Seen) -> nalgebra::Vector3<f64> {

@@ -107,8 +107,8 @@ impl ZMapDepth {
 
     fn limits<'a>(&self, view: &'a View<'a>) -> Limits<'a> {
         let [fx, ..] = view.camera().fx_fy_cx_cy();
-        let edges_of = self.options.occlusion.then_some(view);
-        Limits { width_px: self.options.max_triangle * fx, edges_of }
+        let refuses_edges = self.options.occlusion;
+        Limits { width_px: self.options.max_triangle * fx, view, refuses_edges }
     }
 
     /// The answer of a pixel's neighbourhood, or `None` where it takes the whole image.

@@ -113,6 +113,41 @@ fn a_plane_is_reproduced_and_a_miss_says_why() {
 }
 
 #[test]
+fn a_triangle_from_one_surface_to_another_is_flagged_and_a_slanted_one_is_not() {
+    // A screen 1 m away before a wall at 3 m, each with a point every 2 cm: without the test triangles lead from one to
+    // the other.
+    let plane = |half: i32, z: f32| -> Vec<Point3<f32>> {
+        let at = move |i: i32| 0.02 * i as f32;
+        (-half..=half)
+            .flat_map(|i| (-half..=half).map(move |j| Point3::new(at(i) + 0.003, at(j) - 0.002, z)))
+            .collect()
+    };
+    let mut points = plane(10, 1.0);
+    points.extend(plane(100, 3.0));
+    let camera = camera();
+    let mut keyframe = look(&camera, [0.0; 3], [0.0, 0.0, 1.0]);
+    keyframe.world_from_camera = Some(Rigid::identity());
+    let pixels = grid(&camera, 3);
+    let depths = zmap(points, with(false)).depths(&keyframe, &pixels).unwrap();
+    let (mut between, mut flagged) = (0, 0);
+    for depth in depths.iter().flatten() {
+        let is_between = depth.z_m > 1.05 && depth.z_m < 2.95;
+        between += usize::from(is_between);
+        flagged += usize::from(is_between && depth.on_edge);
+    }
+    assert!(between > 100 && flagged * 10 > between * 9, "{flagged} of {between} between the surfaces");
+    // A floor at a slant, seen to 8 m, where each triangle spans more than a twentieth of depth.
+    let floor: Vec<Point3<f32>> = (0..40)
+        .flat_map(|i| (0..40).map(move |j| Point3::new(0.3 * i as f32 - 6.0, 1.0, 0.5 + 0.3 * j as f32)))
+        .collect();
+    let depths =
+        zmap(floor, ZMapOptions { max_triangle: 1.0, ..with(false) }).depths(&keyframe, &pixels).unwrap();
+    let seen: Vec<_> = depths.iter().flatten().filter(|d| d.z_m < 8.0).collect();
+    assert!(seen.len() > 1000);
+    assert!(seen.iter().all(|d| !d.on_edge), "{}", seen.iter().filter(|d| d.on_edge).count());
+}
+
+#[test]
 fn points_on_one_line_or_at_one_place_span_nothing() {
     let camera = camera();
     let mut keyframe = look(&camera, [0.0; 3], [0.0, 0.0, 1.0]);

@@ -7,6 +7,7 @@ use crate::result::ResultDocument;
 
 use crate::text::printable;
 
+use super::held::held;
 use super::rows::{mean_and_deviation, rows, sizes};
 
 /// A `tabular` to `\input`; it needs the package booktabs.
@@ -24,16 +25,16 @@ pub fn render(document: &ResultDocument) -> RunResult<String> {
         escape(&document.dataset.format),
         escape(&document.dataset.camera)
     )?;
-    writeln!(text, "\\begin{{tabular}}{{lrrrl{}}}", "r".repeat(2 * n))?;
+    writeln!(text, "\\begin{{tabular}}{{lrrrl{}}}", "r".repeat(2 * n + 1))?;
     writeln!(text, "\\toprule")?;
     writeln!(
         text,
-        " & RMSE & AOE & ROE & & \\multicolumn{{{n}}}{{c}}{{$\\Delta$(VICE, GT) px}} & \\multicolumn{{{n}}}{{c}}{{$\\Delta$(VICE, On-Board) px}} \\\\"
+        " & RMSE & AOE & ROE & & \\multicolumn{{{n}}}{{c}}{{$\\Delta$(VICE, GT) px}} & \\multicolumn{{{n}}}{{c}}{{$\\Delta$(VICE, On-Board) px}} & held labels px \\\\"
     )?;
     let points: Vec<String> =
         sizes.iter().map(|s| if *s == 1 { "1 pt".to_string() } else { format!("{s} pts") }).collect();
     let points = points.join(" & ");
-    writeln!(text, "Estimate & (m) & (rad) & (rad) & Depth & {points} & {points} \\\\")?;
+    writeln!(text, "Estimate & (m) & (rad) & (rad) & Depth & {points} & {points} & [95\\,\\%] \\\\")?;
     writeln!(text, "\\midrule")?;
     for row in rows(document) {
         let three_d = row.trajectory.map(|t| [t.rmse_3d_m, t.aoe_rad, t.roe_rad]).unwrap_or_default();
@@ -46,6 +47,8 @@ pub fn render(document: &ResultDocument) -> RunResult<String> {
                 cells.push(cell.map_or_else(|| "N.A.".to_string(), |c| format!("${c}$")));
             }
         }
+        let held = row.estimate.filter(|p| p.held_rmse_px.is_some()).map(|p| format!("${}$", held(p)));
+        cells.push(held.unwrap_or_else(|| "N.A.".to_string()));
         writeln!(text, "{} \\\\", cells.join(" & "))?;
     }
     writeln!(text, "\\bottomrule")?;

@@ -9,6 +9,7 @@ pub(crate) mod film_frame;
 pub(crate) mod flaw_units;
 pub(crate) mod font;
 pub mod frames;
+pub(crate) mod held;
 pub mod html;
 pub mod latex;
 pub(crate) mod marks;

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use crate::error::RunResult;
-use crate::result::ResultDocument;
+use crate::result::{OWN_ANCHOR, ResultDocument};
 use rerun::{RecordingStream, RecordingStreamBuilder, entity_path};
 use vice_core::camera::Pixel;
 use vice_core::dataset::Dataset;
@@ -91,7 +91,8 @@ fn log_points(recording: &RecordingStream, marks: &Marks, frame: &FrameMarks) ->
 fn log_world(recording: &RecordingStream, document: &ResultDocument) -> RunResult<()> {
     let f32s = |p: [f64; 3]| p.map(|v| v as f32);
     // Points are lifted in the world of their stream; that of the anchor is where the scene is.
-    for part in document.pixel.iter().filter(|p| p.stream == document.settings.anchor) {
+    let placing = |name: &str| name == document.used.anchor || document.used.anchor == OWN_ANCHOR;
+    for part in document.pixel.iter().filter(|p| placing(&p.stream)) {
         for keyframe in &part.keyframes {
             let Some(point) = keyframe.point_world_m else { continue };
             at(recording, keyframe.timestamp_ns);

@@ -2,6 +2,7 @@
 
 use crate::result::ResultDocument;
 
+use super::held::{self, filled, window_name, windows};
 use super::rows::{mean_and_deviation, pixels, rows, sizes};
 use crate::text::printable;
 
@@ -34,13 +35,71 @@ pub fn render(document: &ResultDocument) -> String {
     let mut text = heading(document);
     text.push_str(&align(&grid));
     for part in &document.trajectory {
-        if let Some(problem) = &part.problem {
-            text.push_str(&format!("no RMSE_3D of {}: {}\n", printable(&part.estimate), printable(problem)));
+        match &part.problem {
+            Some(problem) => text.push_str(&format!(
+                "no RMSE_3D of {}: {}\n",
+                printable(&part.estimate),
+                printable(problem)
+            )),
+            None => text.push_str(&format!("{}\n", held::poses(part))),
         }
+    }
+    if let Some(anchor) = held::anchor(document) {
+        text.push_str(&format!("{anchor}\n"));
     }
     text.push('\n');
     text.push_str(&pooled(document));
+    text.push_str(&held_labels(document));
+    text.push_str(&by_age(document));
     text
+}
+
+/// The error of the labels that hold, with its interval.
+fn held_labels(document: &ResultDocument) -> String {
+    if document.pixel.iter().all(|p| p.held.is_none()) {
+        return String::new();
+    }
+    let head = ["stream", "depth", "held px [95 %]", "mrad", "mm", "median px", "set aside"];
+    let mut grid = vec![head.map(String::from).to_vec()];
+    for part in &document.pixel {
+        let Some(held) = &part.held else { continue };
+        let bare = |figure: Option<vice_core::result::Figure>| {
+            figure.map_or_else(not_available, |f| held::value_and_interval(f.rmse, None))
+        };
+        grid.push(vec![
+            printable(&part.stream),
+            printable(&part.depth),
+            held::held(part),
+            bare(held.mrad),
+            bare(held.mm),
+            held.median_px.map_or_else(not_available, |v| held::value_and_interval(v, None)),
+            held::set_aside(held),
+        ]);
+    }
+    let mut text = format!("\n{}", align(&grid));
+    for remark in document.pixel.iter().flat_map(held::remarks) {
+        text.push_str(&format!("{remark}\n"));
+    }
+    text
+}
+
+/// The error by age since the key frame, and by metres moved.
+fn by_age(document: &ResultDocument) -> String {
+    let names = filled(document);
+    if names.is_empty() {
+        return String::new();
+    }
+    let head = ["since the key frame", "depth"].into_iter().map(String::from);
+    let mut grid = vec![head.chain(names.iter().map(|n| format!("{n} px"))).collect::<Vec<_>>()];
+    for part in document.pixel.iter().filter(|p| p.held.is_some()) {
+        let mut cells = vec![printable(&part.stream), printable(&part.depth)];
+        cells.extend(names.iter().map(|name| {
+            let window = windows(part).find(|w| window_name(w) == *name);
+            held::figure(window.and_then(|w| w.px.as_ref()))
+        }));
+        grid.push(cells);
+    }
+    format!("\n{}", align(&grid))
 }
 
 fn not_available() -> String {

@@ -44,9 +44,15 @@ pub(crate) fn part(stream: &str, samples: &[Sample]) -> PixelPart {
         depth: "floor".to_string(),
         rmse_px: BTreeMap::from([(1, None)]),
         pooled_rmse_px: super::numbers::rms(&samples.iter().map(|s| s.error_px).collect::<Vec<_>>()),
+        held_rmse_px: None,
+        interval_95: None,
+        held: None,
+        by_age: vec![],
+        by_distance: vec![],
         scored: samples.len() as u64,
         skipped: vec![],
         keyframes: vec![],
+        depth_doubts: vec![],
         samples: samples.to_vec(),
     }
 }

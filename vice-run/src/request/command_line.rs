@@ -45,7 +45,7 @@ fn options(request: &Request) -> Vec<(&'static str, String)> {
     add("time-offset", streams.time_offset.map(|s| s.as_secs_f64().to_string()));
     let gap = (streams.max_gap != super::DEFAULT_MAX_GAP).then(|| streams.max_gap.as_secs_f64().to_string());
     add("max-gap", gap);
-    add("anchor", streams.anchor.map(|a| a.to_string()));
+    add("anchor", streams.anchor.as_ref().map(ToString::to_string));
     add("initial-pose", streams.initial_pose.and_then(|p| numbers(&p)));
     add("depth", list(depth.sources.iter().map(|n| n.name().to_string()).collect()));
     add("zmap-occlusion", depth.zmap_occlusion.map(|on| if on { "on" } else { "off" }.to_string()));
@@ -53,7 +53,8 @@ fn options(request: &Request) -> Vec<(&'static str, String)> {
     add("zcam-range", depth.zcam_range_m.and_then(|r| numbers(&r)));
     add("tag-size", depth.tag_size_m.map(|v| v.to_string()));
     add("tag-family", depth.tag_family.map(|f| f.name().to_string()));
+    add("depth-check", depth.compare.map(|on| if on { "on" } else { "off" }.to_string()));
     add("subsets", list(scoring.subsets.iter().map(usize::to_string).collect()));
-    add("align", (scoring.align != Default::default()).then(|| scoring.align.name().to_string()));
+    add("align", scoring.align.map(|a| a.name().to_string()));
     options
 }

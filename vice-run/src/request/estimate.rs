@@ -115,25 +115,39 @@ impl From<ReferenceSpec> for Option<String> {
     }
 }
 
-/// What places the camera in the world for depth.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+/// What places the camera in the world for depth. As text: `reference`, `estimate`, or the name of a stream.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "String", into = "String")]
 pub enum Anchor {
     /// The reference.
     Reference,
     /// The first estimate.
     Estimate,
+    /// The stream of this name, as the table has it.
+    Stream(String),
+}
+
+impl From<String> for Anchor {
+    fn from(text: String) -> Self {
+        match text.as_str() {
+            "reference" => Self::Reference,
+            "estimate" => Self::Estimate,
+            _ => Self::Stream(text),
+        }
+    }
+}
+
+impl From<Anchor> for String {
+    fn from(anchor: Anchor) -> Self {
+        anchor.to_string()
+    }
 }
 
 impl FromStr for Anchor {
-    type Err = String;
+    type Err = Infallible;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "reference" => Ok(Self::Reference),
-            "estimate" => Ok(Self::Estimate),
-            _ => Err("expected reference or estimate".to_string()),
-        }
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        Ok(Self::from(text.to_string()))
     }
 }
 
@@ -142,6 +156,7 @@ impl fmt::Display for Anchor {
         f.write_str(match self {
             Self::Reference => "reference",
             Self::Estimate => "estimate",
+            Self::Stream(name) => name,
         })
     }
 }

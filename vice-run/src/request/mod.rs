@@ -157,11 +157,12 @@ pub struct StreamsSpec {
     /// Widest gap between two poses that is interpolated, seconds.
     #[serde(default = "default_max_gap", rename = "max_gap_s", with = "seconds")]
     pub max_gap: Span,
-    /// What places the camera in the world for depth; `None`: the reference where there is one.
+    /// What places the camera in the world for depth; `None`: the reference where there is one, else each estimate for
+    /// itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub anchor: Option<Anchor>,
-    /// Pose `world_from_body` of the anchoring estimate at the first key frame: x, y, z in metres, then the quaternion
-    /// x, y, z, w.
+    /// Pose `world_from_body` of the anchoring estimate, or of each where each is its own anchor, at the first key frame:
+    /// x, y, z in metres, then the quaternion x, y, z, w.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initial_pose: Option<[f64; 7]>,
 }
@@ -211,6 +212,10 @@ pub struct DepthSpec {
     /// Family of the tags; `None`: 36h11.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tag_family: Option<TagFamily>,
+    /// Whether the depths at the key frames are compared with what a depth camera or scan of the recording says, where
+    /// these are not asked for themselves; `None`: yes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compare: Option<bool>,
 }
 
 /// How it is scored.
@@ -220,9 +225,10 @@ pub struct Scoring {
     /// Numbers of points whose subsets are averaged over; empty: those up to 3 that exist.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub subsets: Vec<usize>,
-    /// Alignment of the trajectory errors.
-    #[serde(default)]
-    pub align: Alignment,
+    /// Alignment of the trajectory errors; `None`: SE3, and the first pose for a stream that starts in the reference's own
+    /// state.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub align: Option<Alignment>,
 }
 
 impl Request {

@@ -28,7 +28,8 @@ fn everything() -> Request {
     request.depth.zmap_occlusion = Some(false);
     request.depth.tag_size_m = Some(0.1);
     request.depth.tag_family = Some(TagFamily::T25h9);
-    request.scoring = Scoring { subsets: vec![1, 2], align: Alignment::Yaw };
+    request.depth.compare = Some(false);
+    request.scoring = Scoring { subsets: vec![1, 2], align: Some(Alignment::Yaw) };
     request
 }
 
@@ -55,7 +56,7 @@ fn the_command_line_says_what_is_not_the_default() {
          --labels labels.csv --points a --observations manual --fps 10 --start 1.000000001 --duration 30 \
          --estimate odom,rel:motions.txt,imu-euler --reference truth.txt --estimate-frame camera --time-offset -0.05 \
          --anchor estimate --initial-pose 1,2,3,0,0,0,1 --depth zmap,tag --zmap-occlusion off --tag-size 0.1 \
-         --tag-family 25h9 --subsets 1,2 --align yaw"
+         --tag-family 25h9 --depth-check off --subsets 1,2 --align yaw"
     );
 }
 

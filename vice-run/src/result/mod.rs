@@ -45,12 +45,15 @@ pub struct ResultDocument {
     pub suspicions: Suspicions,
 }
 
+/// In place of a stream's name where each stream places the camera for its own depth.
+pub const OWN_ANCHOR: &str = "each stream its own";
+
 /// What took the place of what a request leaves open.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Used {
     /// Names of the points that take part.
     pub points: Vec<String>,
-    /// The pose stream that places the camera for depth.
+    /// The pose stream that places the camera for depth, or [`OWN_ANCHOR`].
     pub anchor: String,
     /// Seconds added to the estimates' stamps.
     pub time_offset_s: f64,
@@ -78,7 +81,7 @@ impl ResultDocument {
     pub fn drop_samples(&mut self) {
         self.paths.clear();
         self.pixel.iter_mut().for_each(|p| p.samples.clear());
-        self.trajectory.iter_mut().for_each(|t| t.frames.clear());
+        self.trajectory.iter_mut().for_each(TrajectoryPart::drop_plots);
     }
 
     /// Largest [`PixelPart::skipped_percent`] of all parts.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::Deserialize;
+use vice_core::evaluate::Observations;
 use vice_core::result::{DatasetPart, PathPart, PixelPart, Role, TrajectoryPart};
 use vice_core::suspicion::Suspicions;
 use vice_core::time::Span;
@@ -87,6 +88,7 @@ fn request(s: &Settings, dataset: &DatasetPart, pixel: &[PixelPart]) -> Request 
         }
     }
     let has_reference = pixel.iter().any(|p| p.role == Role::Reference);
+    let estimates = list("estimate").len();
     let anchored_on_estimate = pixel.iter().any(|p| p.stream == s.anchor && p.role == Role::Estimate);
     Request {
         dataset: DatasetSpec {
@@ -101,7 +103,8 @@ fn request(s: &Settings, dataset: &DatasetPart, pixel: &[PixelPart]) -> Request 
         labels: LabelsSpec {
             file: PathBuf::from(&s.labels),
             points: list("points"),
-            observations: other("observations").and_then(|o| o.parse().ok()).unwrap_or_default(),
+            // What was the default then.
+            observations: other("observations").and_then(|o| o.parse().ok()).unwrap_or(Observations::All),
         },
         protocol: Protocol { fps: s.fps, start: span(s.start_s), duration: s.duration_s.map(span) },
         streams: StreamsSpec {
@@ -112,7 +115,8 @@ fn request(s: &Settings, dataset: &DatasetPart, pixel: &[PixelPart]) -> Request 
             times: other("times").map(PathBuf::from),
             time_offset: (s.time_offset_s != 0.0).then(|| span(s.time_offset_s)),
             max_gap: span(s.max_gap_s),
-            anchor: (has_reference && anchored_on_estimate).then_some(Anchor::Estimate),
+            // Without a reference the first estimate was the anchor of all.
+            anchor: (anchored_on_estimate && (has_reference || estimates > 1)).then_some(Anchor::Estimate),
             initial_pose: <[f64; 7]>::try_from(numbers("initial-pose")).ok(),
         },
         depth: DepthSpec {
@@ -122,10 +126,12 @@ fn request(s: &Settings, dataset: &DatasetPart, pixel: &[PixelPart]) -> Request 
             zcam_range_m: <[f64; 2]>::try_from(numbers("zcam-range")).ok(),
             tag_size_m: other("tag-size").and_then(|v| v.parse().ok()),
             tag_family: other("tag-family").and_then(|v| v.parse().ok()),
+            compare: Some(false),
         },
         scoring: Scoring {
             subsets: list("subsets").iter().filter_map(|v| v.parse().ok()).collect(),
-            align: s.align.parse().unwrap_or_default(),
+            // The default was one alignment for all streams.
+            align: Some(s.align.parse().unwrap_or_default()),
         },
     }
 }

@@ -85,6 +85,8 @@ fn section(run: &Run, place: usize, alone: bool) -> Markup {
             h2 { "The table" }
             (tables::paper(document))
             (tables::scored(document))
+            (tables::held_labels(document))
+            (tables::doubts(document))
             h2 { "On the images" }
             (overlay::strip(&format!("run{place}"), marks.as_ref(), &run.shots, time_zero(document)))
             @for more in &run.more {
@@ -153,6 +155,7 @@ fn cards(document: &ResultDocument) -> Markup {
                     div { (printable(&part.stream)) @if part.role == Role::Reference { " (reference)" } }
                     b { (part.pooled_rmse_px.map_or_else(|| "–".to_string(), px)) }
                     div.soft {
+                        @if let Some([low, high]) = part.interval_95 { "95 %: " (px(low)) " to " (px(high)) br; }
                         (part.scored) " labels scored"
                         @if !part.skipped.is_empty() { ", " (part.skipped.len()) " skipped" }
                         @if let Some(t) = document.trajectory.iter().find(|t| part.role == Role::Estimate && t.estimate == part.stream) {
@@ -170,7 +173,7 @@ fn cards(document: &ResultDocument) -> Markup {
 fn data(run: &Run) -> RunResult<String> {
     let mut document = run.document.clone();
     document.paths.clear();
-    document.trajectory.iter_mut().for_each(|t| t.frames.clear());
+    document.trajectory.iter_mut().for_each(vice_core::result::TrajectoryPart::drop_plots);
     for part in &mut document.pixel {
         part.samples.clear();
         part.keyframes.clear();

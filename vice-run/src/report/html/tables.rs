@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use crate::result::ResultDocument;
 use maud::{Markup, html};
-use vice_core::result::Role;
+use vice_core::result::{PixelPart, Role};
 
+use crate::report::held;
 use crate::report::rows::{mean_and_deviation, pixels, rows, sizes};
 use crate::text::printable;
 
@@ -62,10 +63,66 @@ pub(crate) fn paper(document: &ResultDocument) -> Markup {
              On-Board: the estimate against the labels."
         }
         @for part in &document.trajectory {
-            @if let Some(problem) = &part.problem {
-                p.warn { "No RMSE_3D of " (printable(&part.estimate)) ": " (printable(problem)) }
+            @match &part.problem {
+                Some(problem) => p.warn { "No RMSE_3D of " (printable(&part.estimate)) ": " (printable(problem)) },
+                None => p.note { (held::poses(part)) "." },
             }
         }
+        @if let Some(anchor) = held::anchor(document) { p.note { (anchor) "." } }
+    }
+}
+
+/// The error of the labels that hold with its interval, and by age since the key frame.
+pub(crate) fn held_labels(document: &ResultDocument) -> Markup {
+    let parts: Vec<&PixelPart> = document.pixel.iter().filter(|p| p.held.is_some()).collect();
+    let names = held::filled(document);
+    html! {
+        @if !parts.is_empty() {
+            div.wide {
+                table {
+                    thead {
+                        tr {
+                            th.t { "labels that hold" } th.t { "depth" } th { "RMSE_2D px [95 %]" } th { "mrad" } th { "mm" }
+                            th { "median px" } th.t { "set aside" }
+                            @for name in &names { th { "at " (name) ", px" } }
+                        }
+                    }
+                    tbody { @for part in &parts { (held_row(part, &names)) } }
+                }
+            }
+            p.note {
+                "A label is set aside where it, or the key frame that its point started from, is off and the other points at that \
+                 time are not. The interval says how RMSE_2D would come out with other points on the same flight; by age, since the \
+                 key frame, or by metres moved, it does not depend on how long labels live."
+            }
+            @for remark in parts.iter().flat_map(|p| held::remarks(p)) { p.warn { (remark) "." } }
+        }
+    }
+}
+
+fn held_row(part: &PixelPart, names: &[String]) -> Markup {
+    html! {
+        @if let Some(held) = &part.held {
+            tr {
+                td.t { (printable(&part.stream)) }
+                td.t { (printable(&part.depth)) }
+                td { (held::held(part)) }
+                td { (held::figure(held.mrad.as_ref())) }
+                td { (held::figure(held.mm.as_ref())) }
+                td { (held.median_px.map_or_else(|| NOT_AVAILABLE.to_string(), |v| held::value_and_interval(v, None))) }
+                td.t { (held::set_aside(held)) }
+                @for name in names {
+                    td { (held::figure(held::windows(part).find(|w| held::window_name(w) == *name).and_then(|w| w.px.as_ref()))) }
+                }
+            }
+        }
+    }
+}
+
+/// What looks wrong but did not stop the evaluation.
+pub(crate) fn doubts(document: &ResultDocument) -> Markup {
+    html! {
+        @for suspicion in document.suspicions.iter() { p.warn { (printable(&suspicion.line())) } }
     }
 }
 

@@ -108,8 +108,10 @@ fn says(document: &ResultDocument, common: bool) -> String {
             off.unwrap_or_default()
         ));
     }
+    let mut ways: Vec<&str> = document.trajectory.iter().map(|t| t.align.as_str()).collect();
+    ways.dedup();
     let aligned = match document.trajectory.first() {
-        Some(t) if common => format!("estimates aligned by {}", printable(&t.align)),
+        Some(_) if common => format!("estimates aligned by {}", printable(&ways.join(", "))),
         _ if common => "in the world of the reference".to_string(),
         _ => "each from its own start, since they share no world".to_string(),
     };
