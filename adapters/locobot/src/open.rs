@@ -96,6 +96,12 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> DataResult<RosDataset>
         cameras.push(RosCamera { name, images, info: found });
     }
     let depth = chosen.depth.map(&mut images).transpose()?.flatten();
+    if depth_unit.is_some() && depth.is_none() {
+        let problem = "depth_unit is set, but there are no depth images in use";
+        return Err(DataError::of_kind(ErrorKind::Usage, problem)
+            .at(path)
+            .hint("set depth_topic, or leave it out"));
+    }
     name_apart(&mut cameras);
     cameras.iter().for_each(|camera| doubts.say_all(camera.doubts()));
     let color = cameras.first().filter(|_| chosen.color.is_some());

@@ -210,5 +210,7 @@ fn depth_in_another_unit_is_doubted_and_can_be_said() {
         let error = recording.open(&[("depth_unit", "feet")]).err().unwrap().to_string();
         assert!(error.contains("depth_unit = feet (it is m, cm, mm"), "{error}");
     }
+    let error = Opened::bag(&without(depth)).open(&[("depth_unit", "mm")]).err().unwrap().to_string();
+    assert!(error.contains("depth_unit is set, but there are no depth images in use"), "{error}");
     assert_eq!(z(&with("32FC1", &1.5_f32.to_le_bytes(), 16), &[]), (1.5, String::new()));
 }
