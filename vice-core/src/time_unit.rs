@@ -42,8 +42,9 @@ pub fn mixed_up(a: (&str, (Stamp, Stamp)), b: (&str, (Stamp, Stamp))) -> Option<
         Some(unit) => Some(format!("the {} look like {unit}", suspect.0)),
         None => {
             let offset = own_start(b.1, a.1)?;
+            let option = if a.0 == "poses" { " (--time-offset)" } else { "" };
             Some(format!(
-                "the {} count from their own start, the {} from 1970: {} s added to the {} would put both starts together",
+                "the {} count from their own start, the {} from 1970: {} s added to the {}{option} would put both starts together",
                 suspect.0,
                 expected.0,
                 offset.to_seconds_text(),

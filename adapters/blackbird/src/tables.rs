@@ -41,7 +41,7 @@ pub(crate) fn first_pose_stamp(path: &Path) -> Option<Stamp> {
     let mut rows = rows::open(path).ok()?;
     let beginning = rows.begin().ok()?;
     let heading = beginning.heading.as_ref().or(beginning.comments.first());
-    let named = heading.and_then(|h| h.time().ok().flatten());
+    let named = heading.and_then(|h| h.time().ok().flatten()).map(|t| t.small_in(TimeUnit::Micros));
     let mut time = named.unwrap_or_else(|| TimeColumn::new(0, Some(TimeUnit::Micros)));
     time.stamp(&rows.next_row().ok()??).ok()
 }

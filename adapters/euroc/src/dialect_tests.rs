@@ -29,6 +29,9 @@ fn lists_are_read_by_the_names_of_their_columns() {
     rows("# index time_s image_name", &|t, i| {
         format!("{i} {}.{:09} {t}.png\n", t / 1_000_000_000, t % 1_000_000_000)
     });
+    // A simulation counts from zero, and says no unit.
+    sequence.write("mav0/cam0/data.csv", "timestamp,filename\n0,a.png\n50000000,b.png\n");
+    assert_eq!(sequence.dataset().frames("cam0").unwrap()[1].as_nanos(), 50_000_000);
     sequence.write("mav0/cam0/data.csv", "timestamp,filename\n1,a.png,3\n");
     assert!(
         problem(sequence.dataset().frames("cam0"))

@@ -166,7 +166,7 @@ impl Columns {
                 return Ok(None);
             };
             heading.check_width(beginning.columns, time.columns().chain([name]))?;
-            Ok(Some(Self { time, name }))
+            Ok(Some(Self { time: time.small_in(TimeUnit::Nanos), name }))
         };
         if let Some(heading) = &beginning.heading {
             if heading.times().is_empty() {

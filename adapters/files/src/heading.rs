@@ -22,12 +22,21 @@ pub struct TimeColumn {
     nanos: Option<usize>,
     /// `None` until the first row shows it.
     unit: Option<TimeUnit>,
+    /// What whole numbers too small to show a unit are in.
+    small: TimeUnit,
 }
 
 impl TimeColumn {
     /// Stamps in one column of a known unit, or one that the first row shows.
     pub const fn new(column: usize, unit: Option<TimeUnit>) -> Self {
-        Self { column, nanos: None, unit }
+        Self { column, nanos: None, unit, small: TimeUnit::Seconds }
+    }
+
+    /// The same, where whole numbers that are too small to be of today's epoch are in the unit of the format: stamps of
+    /// a simulation may count nanoseconds from zero.
+    #[must_use]
+    pub const fn small_in(self, unit: TimeUnit) -> Self {
+        Self { small: unit, ..self }
     }
 
     /// The columns that are read.
@@ -57,7 +66,12 @@ impl TimeColumn {
         let unit = match self.unit {
             Some(unit) => unit,
             None => {
-                let unit = row.number(self.column).map_or(TimeUnit::Seconds, TimeUnit::of_magnitude);
+                let whole =
+                    row.field(self.column).is_some_and(|text| text.bytes().all(|b| b.is_ascii_digit()));
+                let unit = match row.number(self.column).map_or(TimeUnit::Seconds, TimeUnit::of_magnitude) {
+                    TimeUnit::Seconds if whole => self.small,
+                    shown => shown,
+                };
                 *self.unit.insert(unit)
             }
         };
@@ -318,6 +332,11 @@ mod tests {
             stamp("%time,field.header.stamp,x", "1,1403715273262142976,0").unwrap(),
             1_403_715_273_262_142_976
         );
+        // Nanoseconds from zero on, in a format of nanoseconds.
+        let mut small = TimeColumn::new(0, None).small_in(TimeUnit::Nanos);
+        let mut rows = Rows::new("0\n50000000\n".as_bytes());
+        assert_eq!(small.stamp(&rows.next_row().unwrap().unwrap()).unwrap().as_nanos(), 0);
+        assert_eq!(small.stamp(&rows.next_row().unwrap().unwrap()).unwrap().as_nanos(), 50_000_000);
         assert!(stamp("t [s],x", "1403715273262142976,0").unwrap_err().contains("look like nanoseconds"));
         assert!(stamp("t [ns],x", "1403715273.26,0").unwrap_err().contains("look like seconds"));
     }

@@ -146,6 +146,7 @@ fn by_names(heading: &Heading, row: &Row<'_>) -> DataResult<Option<Columns>> {
     if !same(gyro) || !same(accel) {
         return Err(heading.error(format!("the axes of a sensor have different units: {}", heading.shown())));
     }
+    let time = time.small_in(TimeUnit::Nanos);
     Ok(Some(Columns { time, gyro, accel, worth: [rate, acceleration], width: row.len() }))
 }
 

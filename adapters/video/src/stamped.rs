@@ -25,10 +25,14 @@ pub fn read_stamps(path: impl AsRef<Path>) -> DataResult<Arc<[Stamp]>> {
     let mut read = || {
         let beginning = rows.begin()?;
         let mut time = match &beginning.heading {
-            Some(heading) => heading.time()?.filter(|_| heading.names().len() == 1).ok_or_else(|| {
-                let first = heading.names().first().map_or("", |n| n.text.as_str());
-                DataError::new(format!("column 1: `{first}` is no time stamp")).line(heading.line())
-            })?,
+            Some(heading) => heading
+                .time()?
+                .filter(|_| heading.names().len() == 1)
+                .map(|t| t.small_in(TimeUnit::Nanos))
+                .ok_or_else(|| {
+                    let first = heading.names().first().map_or("", |n| n.text.as_str());
+                    DataError::new(format!("column 1: `{first}` is no time stamp")).line(heading.line())
+                })?,
             None => TimeColumn::new(0, Some(TimeUnit::Nanos)),
         };
         while let Some(row) = rows.next_row()? {

@@ -95,7 +95,11 @@ impl Columns {
 
     /// A stamp in the unit of the column.
     pub(super) fn stamp(&mut self, text: &str) -> Result<Stamp, TimeError> {
-        let by_size = || text.parse::<f64>().map_or(TimeUnit::Nanos, TimeUnit::of_magnitude);
+        let by_size = || match text.parse::<f64>().map_or(TimeUnit::Nanos, TimeUnit::of_magnitude) {
+            // Labels are in nanoseconds, which those of a simulation count from zero.
+            TimeUnit::Seconds if text.bytes().all(|b| b.is_ascii_digit()) => TimeUnit::Nanos,
+            shown => shown,
+        };
         match *self.unit.get_or_insert_with(by_size) {
             TimeUnit::Seconds => Stamp::parse_seconds(text),
             TimeUnit::Millis => Stamp::parse_millis(text),

@@ -58,7 +58,12 @@ pub(super) fn find(beginning: &Beginning, row: &Row<'_>, places: Places) -> Data
     let headings = beginning.heading.iter().chain(&beginning.comments);
     for heading in headings {
         if let Some(layout) = by_names(heading, row)? {
-            return Ok(Layout::Poses(layout));
+            let time = layout.time.small_in(match places {
+                Places::Shown => TimeUnit::Seconds,
+                Places::Euroc => TimeUnit::Nanos,
+                Places::Blackbird => TimeUnit::Micros,
+            });
+            return Ok(Layout::Poses(PoseLayout { time, ..layout }));
         }
     }
     match places {
