@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use vice_core::diagnose::{
-    Diagnosed, Diagnosis, DiagnosisDocument, Flaw, Options, Theta, VerdictKind, diagnose,
+    Diagnosed, Diagnosis, DiagnosisDocument, Flaw, OdometryNoise, Options, Theta, VerdictKind, diagnose,
 };
 use vice_core::evaluate::Evaluation;
 use vice_core::metrics::align::Alignment;
@@ -44,15 +44,16 @@ pub(crate) struct Args {
 #[command(next_help_heading = "Diagnosis")]
 pub(crate) struct LookingArgs {
     /// Look for these flaws only: clock-offset, extrinsic-rotation, extrinsic-translation, focal-length,
-    /// principal-point, initial-tilt (of imu-euler), scale, drift.
+    /// principal-point, initial-tilt (of imu-euler), scale, drift, distortion, aspect, clock-rate, clock-step,
+    /// rolling-shutter.
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     flaws: Vec<Flaw>,
-    /// Resamples of points and blocks of time behind intervals and comparisons.
-    #[arg(long, value_name = "N", default_value = "1000", value_parser = clap::value_parser!(u32).range(100..=100_000))]
-    resamples: u32,
-    /// Seed of the resampling.
-    #[arg(long, value_name = "N", default_value = "1")]
-    seed: u64,
+    /// How much the odometry may wander and still be healthy, a root second: 5mm,0.06deg, or wheel, vio, mocap.
+    #[arg(long, value_name = "NOISE", default_value = "vio")]
+    odometry_noise: OdometryNoise,
+    /// No longer means anything: intervals come from the noise of labels and poses, not from resampling.
+    #[arg(long, value_name = "N", hide = true, value_parser = clap::value_parser!(u32).range(100..=100_000))]
+    resamples: Option<u32>,
 }
 
 impl LookingArgs {
@@ -61,7 +62,10 @@ impl LookingArgs {
     }
 
     pub(crate) fn options(&self) -> Options {
-        Options { resamples: self.resamples as usize, seed: self.seed }
+        if self.resamples.is_some() {
+            tracing::warn!("--resamples does nothing any more: nothing is resampled");
+        }
+        Options { odometry_noise: self.odometry_noise }
     }
 }
 
@@ -140,8 +144,17 @@ fn corrected(
         "--apply: nothing to apply, and nothing is written: {}",
         verdict.sentence
     );
-    let in_no_calibration = [Flaw::InitialTilt, Flaw::Scale, Flaw::Drift];
-    if let Some(flaw) = verdict.flaws.iter().find(|f| in_no_calibration.contains(f)) {
+    let in_a_calibration = [
+        Flaw::ClockOffset,
+        Flaw::ExtrinsicRotation,
+        Flaw::ExtrinsicTranslation,
+        Flaw::FocalLength,
+        Flaw::PrincipalPoint,
+        Flaw::Distortion,
+        Flaw::Aspect,
+    ];
+    if let Some(flaw) = verdict.flaws.iter().find(|f| in_a_calibration.iter().all(|of| of.name() != f.as_str()))
+    {
         anyhow::bail!(
             "--apply: {flaw} is a flaw of the estimate, which no calibration can correct: nothing is written"
         );
@@ -194,7 +207,7 @@ fn write_text(text: &mut String, document: &DiagnosisDocument) -> std::fmt::Resu
     let (labels, verdict) = (&document.labels, &document.verdict);
     writeln!(
         text,
-        "{}, {} with {}: {:.3} px over {} labels of {} points ({} blocks of {})\n",
+        "{}, {} with {}: {:.3} px over {} labels of {} points ({} {}, {:.1} s)\n",
         printable(&document.dataset),
         printable(&document.stream),
         printable(&document.depth),
@@ -203,6 +216,7 @@ fn write_text(text: &mut String, document: &DiagnosisDocument) -> std::fmt::Resu
         labels.points,
         labels.blocks,
         labels.blocks_of,
+        labels.seconds,
     )?;
     let mut grid = vec![
         ["flaw, fitted alone [95 %]", "leaves px", "explains", "likelier", "labels show"]
@@ -234,7 +248,7 @@ fn write_text(text: &mut String, document: &DiagnosisDocument) -> std::fmt::Resu
             }
         }
         VerdictKind::CannotTell => writeln!(text, "sureness: {:.1} %", 100.0 * verdict.sureness)?,
-        VerdictKind::NoFlaw => {}
+        _ => {}
     }
     for help in &verdict.labels_that_help {
         writeln!(text, "labels that would help: {help}")?;
