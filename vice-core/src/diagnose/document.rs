@@ -46,6 +46,9 @@ pub struct DiagnosisDocument {
     pub flaws: Vec<FlawPart>,
     /// Pairs of flaws of which one could account for more than half of what the other does.
     pub overlaps: Vec<Overlap>,
+    /// The likeliest hypotheses, the first one first.
+    #[serde(default)]
+    pub hypotheses: Vec<HypothesisPart>,
     /// What it comes to.
     pub verdict: Verdict,
 }
@@ -87,6 +90,25 @@ pub struct OdometryPart {
     pub jitter_m: f64,
     /// Times, in seconds since the camera's first frame, at which the pose jumped or slid.
     pub jumps_s: Vec<f64>,
+}
+
+/// A hypothesis beside the others.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HypothesisPart {
+    /// Its flaws; none for noise alone.
+    pub flaws: Vec<Flaw>,
+    /// Share of all hypotheses.
+    pub share: f64,
+    /// How much likelier it makes the labels than no flaw does, its values integrated over, as a natural logarithm.
+    pub likelier: f64,
+    /// The same at its best values.
+    pub likelier_at_best: f64,
+    /// RMSE_2D that it leaves, pixels.
+    pub rmse_px: f64,
+    /// How often the usual label noise, label walk, position walk, yaw walk, lean and jitter.
+    pub noise_times: [f64; 6],
+    /// Jumps of the pose.
+    pub jumps: usize,
 }
 
 /// A number with its interval.

@@ -12,6 +12,8 @@ use super::scene::Residual;
 /// Roll and pitch forget in this time, seconds.
 const LEAN_S: f64 = 2.5;
 const GRAVITY_M_S2: f64 = 9.81;
+/// How well the velocity is known that an integration starts with.
+const START_M_S: f64 = 0.005;
 /// Numbers of a followed point: its place and the walk of its label.
 const SLOT: usize = 5;
 const JITTER: usize = 6;
@@ -47,11 +49,19 @@ pub(super) struct Whitened {
     pub(super) frame_rows: Vec<usize>,
     /// Sum of the logarithms of variances, by frame.
     pub(super) log_variances: Vec<f64>,
-    /// By segment: what a shift of its key label would do, if asked for.
+    /// By segment or by label: what a shift of it would do, if asked for.
     pub(super) shifts: Vec<Shift>,
 }
 
-/// How whitened rows answer to a shift of one key label by a pixel: products with itself and with the columns.
+/// Whose shifts are followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shifts {
+    Nobodys,
+    Keys,
+    Labels,
+}
+
+/// How whitened rows answer to a shift of one label or key label by a pixel: products with itself and with the columns.
 #[derive(Clone, Debug)]
 pub(super) struct Shift {
     pub(super) own: [[f64; 2]; 2],
@@ -68,6 +78,7 @@ struct State {
 }
 
 impl State {
+    #[inline(always)]
     fn clear(&mut self, at: usize, count: usize) {
         for i in at..at + count {
             for k in 0..self.stride {
@@ -79,6 +90,7 @@ impl State {
     }
 
     /// `state[to] += times · state[from]`.
+    #[inline(always)]
     fn add(&mut self, to: usize, from: usize, times: f64) {
         let s = self.stride;
         for k in 0..self.n {
@@ -90,6 +102,7 @@ impl State {
         self.means.iter_mut().for_each(|m| m[to] += times * m[from]);
     }
 
+    #[inline(always)]
     fn scale(&mut self, at: usize, times: f64) {
         let s = self.stride;
         for k in 0..self.n {
@@ -101,14 +114,15 @@ impl State {
         self.means.iter_mut().for_each(|m| m[at] *= times);
     }
 
+    #[inline(always)]
     fn widen(&mut self, at: usize, variance: f64) {
         self.p[at * self.stride + at] += variance;
     }
 }
 
-/// A key label whose shift is being followed.
+/// A label or key label whose shift is being followed.
 struct Following {
-    segment: usize,
+    of: usize,
     /// Where its two columns stand among the means.
     columns: [usize; 2],
     until: usize,
@@ -122,15 +136,42 @@ pub(super) fn whiten(
     sizes: &Sizes,
     weights: &Weights,
     jumps: &[Jump],
-    shifts: bool,
+    shifts: Shifts,
 ) -> Whitened {
-    /// A shift is followed for so many frames after its segment.
+    // The same sums in the same order, with the widest registers that there are.
+    pulp::Arch::new().dispatch(
+        #[inline(always)]
+        || pass(geometry, columns, sizes, weights, jumps, shifts),
+    )
+}
+
+/// `to += times · from`.
+#[inline(always)]
+fn add_times(to: &mut [f64], times: f64, from: &[f64]) {
+    let n = to.len().min(from.len());
+    let (to, from) = (&mut to[..n], &from[..n]);
+    for i in 0..n {
+        to[i] += times * from[i];
+    }
+}
+
+#[inline(always)]
+fn pass(
+    geometry: &Geometry,
+    columns: &[&[Residual]],
+    sizes: &Sizes,
+    weights: &Weights,
+    jumps: &[Jump],
+    shifts: Shifts,
+) -> Whitened {
+    /// A shift is followed for so many frames after its segment, or its label.
     const AFTER: usize = 30;
+    const AFTER_LABEL: usize = 12;
     let width = columns.len();
     let pose = if geometry.inertial { 9 } else { 6 };
     let first_slot = pose + JITTER;
     let most = geometry.most_followed;
-    let stride = first_slot + SLOT * most;
+    let stride = (first_slot + SLOT * most).next_multiple_of(8);
     let mut state = State {
         n: first_slot,
         stride,
@@ -140,10 +181,12 @@ pub(super) fn whiten(
     };
     let mut slots = vec![usize::MAX; geometry.segments.len()];
     let mut out = Whitened { width, ..Whitened::default() };
-    if shifts {
-        out.shifts =
-            vec![Shift { own: [[0.0; 2]; 2], with: [vec![0.0; width], vec![0.0; width]] }; geometry.segments.len()];
-    }
+    let followed = match shifts {
+        Shifts::Nobodys => 0,
+        Shifts::Keys => geometry.segments.len(),
+        Shifts::Labels => geometry.labels.len(),
+    };
+    out.shifts = vec![Shift { own: [[0.0; 2]; 2], with: [vec![0.0; width], vec![0.0; width]] }; followed];
     let mut following: Vec<Following> = Vec::new();
     let mut spare: Vec<usize> = Vec::new();
     let (mut ph, mut gain) = (vec![0.0; stride], vec![0.0; stride]);
@@ -155,6 +198,9 @@ pub(super) fn whiten(
         state.widen(2, (2.0 * sizes.position_m).powi(2));
     }
     if geometry.inertial {
+        for i in 6..9 {
+            state.widen(i, START_M_S * START_M_S);
+        }
         lean = 0.0;
     }
     for (f, frame) in geometry.frames.iter().enumerate() {
@@ -208,6 +254,11 @@ pub(super) fn whiten(
             let label = &geometry.labels[*l];
             let slot = slots[label.segment];
             let variance = sizes.white_px.powi(2) * weights.labels[*l];
+            let mut shifted = [usize::MAX; 2];
+            if shifts == Shifts::Labels {
+                shifted = [0, 1].map(|_| another(&mut spare, &mut state.means, stride));
+                following.push(Following { of: *l, columns: shifted, until: f + AFTER_LABEL });
+            }
             for axis in 0..2 {
                 let (h, turn) = (&label.by_place[axis], &label.by_turn[axis]);
                 let mut terms = [(0, 0.0); 16];
@@ -222,38 +273,39 @@ pub(super) fn whiten(
                 let n = state.n;
                 ph[..n].fill(0.0);
                 for (i, times) in terms {
-                    let row = &state.p[i * stride..i * stride + n];
-                    for (a, b) in ph[..n].iter_mut().zip(row) {
-                        *a += times * b;
-                    }
+                    add_times(&mut ph[..n], times, &state.p[i * stride..i * stride + n]);
                 }
-                let s = variance + terms.iter().map(|(i, times)| times * ph[*i]).sum::<f64>();
+                let mut s = variance;
+                for (i, times) in terms {
+                    s += times * ph[i];
+                }
                 log_variance += s.ln();
                 let inverse = 1.0 / s;
                 for k in 0..n {
                     gain[k] = ph[k] * inverse;
                 }
                 for k in 0..n {
-                    let g = gain[k];
-                    let row = &mut state.p[k * stride..k * stride + n];
-                    for (a, b) in row.iter_mut().zip(&ph[..n]) {
-                        *a -= g * b;
-                    }
+                    add_times(&mut state.p[k * stride..k * stride + n], -gain[k], &ph[..n]);
                 }
                 let root = inverse.sqrt();
                 let first = out.rows.len();
                 for (c, mean) in state.means.iter_mut().enumerate() {
-                    let predicted: f64 = terms.iter().map(|(i, times)| times * mean[*i]).sum();
-                    let measured = if c < width { columns[c][*l][axis] } else { 0.0 };
+                    let mut predicted = 0.0;
+                    for (i, times) in terms {
+                        predicted += times * mean[i];
+                    }
+                    let measured = match c {
+                        c if c < width => columns[c][*l][axis],
+                        c if c == shifted[axis] => 1.0,
+                        _ => 0.0,
+                    };
                     let innovation = measured - predicted;
                     if c < width {
                         out.rows.push(innovation * root);
                     } else if innovation == 0.0 {
                         continue;
                     }
-                    for (a, b) in mean[..n].iter_mut().zip(&gain[..n]) {
-                        *a += innovation * b;
-                    }
+                    add_times(&mut mean[..n], innovation, &gain[..n]);
                     // What is left of the shift's prediction is its own row, with the sign of the residuals.
                     if c >= width {
                         mean[stride] = innovation * root;
@@ -261,7 +313,7 @@ pub(super) fn whiten(
                 }
                 for one in &following {
                     let own = one.columns.map(|c| state.means[c][stride]);
-                    let shift = &mut out.shifts[one.segment];
+                    let shift = &mut out.shifts[one.of];
                     for a in 0..2 {
                         for b in 0..2 {
                             shift.own[a][b] += own[a] * own[b];
@@ -295,13 +347,10 @@ pub(super) fn whiten(
             slots[*s] = slot;
             state.n = state.n.max(slot + SLOT);
             begin(&mut state, geometry, *s, slot, pose, sizes, weights);
-            if shifts {
+            if shifts == Shifts::Keys {
                 let mut columns = [0; 2];
                 for (a, column) in columns.iter_mut().enumerate() {
-                    let c = spare.pop().unwrap_or_else(|| {
-                        state.means.push(vec![0.0; stride + 1]);
-                        state.means.len() - 1
-                    });
+                    let c = another(&mut spare, &mut state.means, stride);
                     // The filter predicts the shift's effect from here on: a residual of the opposite sign.
                     for i in 0..3 {
                         state.means[c][slot + i] = -geometry.segments[*s].by_pixel[(i, a)];
@@ -309,12 +358,20 @@ pub(super) fn whiten(
                     *column = c;
                 }
                 let until = geometry.segments[*s].last_frame + AFTER;
-                following.push(Following { segment: *s, columns, until });
+                following.push(Following { of: *s, columns, until });
             }
         }
     }
     out.frame_rows.push(out.rows.len() / width);
     out
+}
+
+/// A column of zeros, one more than the state is long: the last number is for its row.
+fn another(spare: &mut Vec<usize>, means: &mut Vec<Vec<f64>>, stride: usize) -> usize {
+    spare.pop().unwrap_or_else(|| {
+        means.push(vec![0.0; stride + 1]);
+        means.len() - 1
+    })
 }
 
 /// A key frame: the error of the point's place, from that of the pose, the label and the depth.

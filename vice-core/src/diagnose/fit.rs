@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::DiagnoseError;
-use super::filter::{Jump, Weights, Whitened, whiten};
+use super::filter::{Jump, Shifts, Weights, Whitened, whiten};
 use super::flaw::{Flaw, PARAMETERS};
 use super::geometry::Geometry;
 use super::motion::Motion;
@@ -17,6 +17,10 @@ const NARROW: f64 = 0.7;
 const WIDE_TIMES: f64 = 4.0;
 /// Step of a size's logarithm in differences.
 const SIZE_STEP: f64 = 0.1;
+/// Variance of a dead label over that of a usual one.
+const DEAD: f64 = 1e8;
+/// Three frames may have a jump if their squares exceed their number by so many deviations.
+const EXCESS: f64 = 3.8;
 /// Longest step of a size's logarithm.
 const LONGEST_SIZE_STEP: f64 = 0.8;
 
@@ -27,6 +31,8 @@ pub(super) struct Work<'s, 'a> {
     pub(super) geometry: Geometry,
     pub(super) noise: NoiseModel,
     pub(super) weights: Weights,
+    /// Labels that cannot be carried where the geometry was taken: they count for nothing.
+    pub(super) dead: Vec<bool>,
 }
 
 /// Normal equations of whitened columns: products of the derivatives, with the residuals, and of these.
@@ -173,6 +179,37 @@ pub(super) fn jump_cost(frames: usize) -> f64 {
     (frames.max(2) as f64).ln() + 2.0
 }
 
+impl<'s, 'a> Work<'s, 'a> {
+    /// Geometry at some values, and all labels of usual weight that can be carried there.
+    pub(super) fn new(
+        scene: &'s Scene<'a>,
+        motion: &'s Motion<'a>,
+        noise: NoiseModel,
+        theta: &Theta,
+    ) -> Result<Self, DiagnoseError> {
+        let view = scene.view(theta, motion)?;
+        let geometry = Geometry::new(scene, &view, noise.inertial);
+        let dead: Vec<bool> = scene.labels.iter().map(|l| view.residual(l).is_none()).collect();
+        let keys = vec![1.0; scene.segments.len()];
+        let weights = Weights { labels: vec![1.0; scene.labels.len()], keys };
+        let mut work = Self { scene, motion, geometry, noise, weights, dead };
+        work.weights = work.without_dead(work.weights.clone());
+        Ok(work)
+    }
+
+    /// Weights under which dead labels count for nothing.
+    pub(super) fn without_dead(&self, mut weights: Weights) -> Weights {
+        weights.labels.iter_mut().zip(&self.dead).filter(|(_, dead)| **dead).for_each(|(w, _)| *w = DEAD);
+        weights
+    }
+
+    /// RMS length of the labels that can be carried, pixels.
+    pub(super) fn rms(&self, residuals: &[Residual]) -> f64 {
+        let alive = || residuals.iter().zip(&self.dead).filter(|(_, dead)| !**dead).map(|(r, _)| r);
+        (alive().map(|r| r.norm_squared()).sum::<f64>() / alive().count().max(1) as f64).sqrt()
+    }
+}
+
 impl Work<'_, '_> {
     pub(super) fn residuals(&self, theta: &Theta) -> Result<Vec<Residual>, DiagnoseError> {
         let lost = Residual::new(LOST_PX, LOST_PX);
@@ -193,7 +230,7 @@ impl Work<'_, '_> {
     ) -> Whitened {
         let all: Vec<&[Residual]> =
             std::iter::once(residuals).chain(columns.iter().map(Vec::as_slice)).collect();
-        whiten(&self.geometry, &all, &self.noise.sizes(logs), &self.weights, jumps, false)
+        whiten(&self.geometry, &all, &self.noise.sizes(logs), &self.weights, jumps, Shifts::Nobodys)
     }
 
     /// The solution of a linearised fit with other sizes or jumps.
@@ -217,6 +254,7 @@ impl Work<'_, '_> {
             geometry: self.geometry.clone(),
             noise: self.noise,
             weights: self.weights.clone(),
+            dead: self.dead.clone(),
         }
     }
 
@@ -379,7 +417,8 @@ impl Work<'_, '_> {
             // Where three frames together are worst.
             let sum = |f: usize| excess[f.saturating_sub(1)..(f + 2).min(frames)].iter().sum::<f64>();
             let Some(worst) = (1..frames).max_by(|a, b| sum(*a).total_cmp(&sum(*b))) else { break };
-            if sum(worst) < 6.0 {
+            let rows = |f: usize| whitened.frame_rows[(f + 2).min(frames)] - whitened.frame_rows[f.saturating_sub(1)];
+            if sum(worst) < EXCESS * (2.0 * rows(worst) as f64).sqrt() {
                 break;
             }
             let tries: Vec<Jump> = [(0, 0), (0, 1), (2, 3), (0, 5), (5, 0), (5, 6), (1, 10), (10, 1)]

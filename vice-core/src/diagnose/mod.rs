@@ -32,7 +32,7 @@ mod verdict;
 mod words;
 
 pub use document::{
-    CauseName, DiagnosisDocument, Estimated, FlawPart, LabelsPart, OdometryPart, Overlap, SCHEMA, Verdict,
+    CauseName, DiagnosisDocument, Estimated, FlawPart, HypothesisPart, LabelsPart, OdometryPart, Overlap, SCHEMA, Verdict,
     VerdictKind,
 };
 pub use flaw::{Flaw, PARAMETER_COUNT, PARAMETERS, ParameterInfo};
@@ -41,9 +41,7 @@ pub use noise::OdometryNoise;
 pub use sensitivity::{Curve, CurvePoint, SENSITIVITY_SCHEMA, SensitivityDocument, sensitivity};
 pub use theta::Theta;
 
-use filter::Weights;
 use fit::Work;
-use geometry::Geometry;
 use gross::{BETTER, Hypothesis, hypotheses, independent, is_frozen};
 use motion::{Motion, Poses};
 use noise::NoiseModel;
@@ -119,16 +117,11 @@ pub fn diagnose(
     let flaws = flaws_of(diagnosis)?;
     let prepared = Prepared::new(diagnosis, &flaws)?;
     let Prepared { scene, motion, gross, .. } = &prepared;
-    let mut work = Work {
-        scene,
-        motion,
-        geometry: Geometry::new(scene, &scene.view(&Theta::zero(), motion)?, diagnosis.inertial.is_some()),
-        noise: NoiseModel {
-            odometry: diagnosis.options.odometry_noise,
-            inertial: diagnosis.inertial.is_some(),
-        },
-        weights: Weights::default(),
+    let noise = NoiseModel {
+        odometry: diagnosis.options.odometry_noise,
+        inertial: diagnosis.inertial.is_some(),
     };
+    let mut work = Work::new(scene, motion, noise, &Theta::zero())?;
     let found = search(&mut work, &flaws, progress)?;
     Ok(report::diagnosed(diagnosis, &prepared, &work, &found, gross))
 }
@@ -139,8 +132,6 @@ pub(self) struct Gross {
     frozen: bool,
     /// How much likelier it is than what was read, as a logarithm.
     likelier: f64,
-    /// Share of the labels that cannot be carried as the poses are taken.
-    lost: f64,
 }
 
 /// Labels, poses as they are taken, and the RMSE_2D of what was read.
@@ -178,17 +169,10 @@ impl<'a> Prepared<'a> {
         }
         let first_frame = scene.first_frame;
         let as_read = Motion { poses: Poses::new(trajectory, first_frame), inertial, first_frame, id: 0 };
-        let (motion, mut gross) = match inertial {
-            Some(_) => (as_read, Gross { conventions: vec![], frozen: false, likelier: 0.0, lost: 0.0 }),
+        let (motion, gross) = match inertial {
+            Some(_) => (as_read, Gross { conventions: vec![], frozen: false, likelier: 0.0 }),
             None => conventions(diagnosis, &scene, as_read, flaws)?,
         };
-        let valid: Vec<bool> =
-            scene.residuals(&Theta::zero(), &motion)?.iter().map(Option::is_some).collect();
-        gross.lost = valid.iter().filter(|v| !**v).count() as f64 / valid.len() as f64;
-        scene.only(&valid);
-        if scene.labels.is_empty() {
-            return Err(DiagnoseError::NothingScored);
-        }
         let motion = match inertial {
             Some(_) => motion,
             None => Motion { poses: motion.poses.smoothed(), id: 2_000, ..motion },
@@ -207,13 +191,13 @@ fn conventions<'a>(
     let trajectory = &diagnosis.evaluation.streams[diagnosis.stream].trajectory;
     let mut all = hypotheses(diagnosis.evaluation, scene, trajectory)?;
     let frozen = is_frozen(&all[0]);
-    let nothing = Gross { conventions: vec![], frozen, likelier: 0.0, lost: 0.0 };
+    let nothing = Gross { conventions: vec![], frozen, likelier: 0.0 };
     let better = |h: &Hypothesis, than: f64| than - h.unlikely > BETTER;
     if all.len() < 2 || frozen || !better(&all[1], all[0].unlikely) {
         return Ok((as_read, nothing));
     }
     let unusual = all[0].unlikely - all[0].cost * independent(scene.labels.len());
-    let by_flaw = best_flaw_cost(diagnosis, scene, &as_read, flaws)? * independent(scene.labels.len());
+    let by_flaw = best_flaw_cost(scene, &as_read, flaws)? * independent(scene.labels.len());
     if !better(&all[1], by_flaw + unusual) {
         return Ok((as_read, nothing));
     }
@@ -225,20 +209,13 @@ fn conventions<'a>(
 
 /// The least robust cost that any flaw alone leaves of the poses as they were read.
 fn best_flaw_cost<'a>(
-    diagnosis: &Diagnosis<'a>,
     scene: &Scene<'a>,
     motion: &Motion<'a>,
     flaws: &[Flaw],
 ) -> Result<f64, DiagnoseError> {
-    let mut work = Work {
-        scene,
-        motion,
-        geometry: Geometry::new(scene, &scene.view(&Theta::zero(), motion)?, false),
-        noise: NoiseModel { odometry: diagnosis.options.odometry_noise, inertial: false },
-        weights: Weights { labels: vec![1.0; scene.labels.len()], keys: vec![1.0; scene.segments.len()] },
-    };
     // Far from the answer the poses' noise says little: a wide one lets each flaw do what it can.
-    work.noise.odometry = OdometryNoise::WHEEL;
+    let noise = NoiseModel { odometry: OdometryNoise::WHEEL, inertial: false };
+    let work = Work::new(scene, motion, noise, &Theta::zero())?;
     let zero = Theta::zero();
     let mut least = robust_cost(&work.residuals(&zero)?);
     for flaw in flaws {

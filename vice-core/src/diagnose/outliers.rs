@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
-use super::filter::{Weights, whiten};
+use super::filter::{Shifts, Weights, whiten};
 use super::fit::{Fit, Normal, Work, expected_of};
 use super::scene::{Residual, Scene};
 
@@ -12,13 +12,15 @@ const RAISED: f64 = 400.0;
 const FAR: f64 = 4.6;
 /// Chi-square of the shift of a key label that is one.
 const FAR_KEY: f64 = 16.0;
+/// The same of a label.
+const FAR_LABEL: f64 = 20.0;
 /// At most this share of the segments.
 const MOST_KEYS: f64 = 1.0 / 6.0;
 /// Deviations below this are exact data, pixels.
 const LEAST_PX: f64 = 0.02;
 
 /// Labels far from what their neighbours along the segment predict: free of whatever moves them smoothly.
-pub(super) fn labels(scene: &Scene<'_>, residuals: &[Residual]) -> Vec<bool> {
+fn labels(scene: &Scene<'_>, residuals: &[Residual]) -> Vec<bool> {
     let mut outliers = vec![false; scene.labels.len()];
     let all: Vec<Vec<usize>> = scene.segments.iter().map(|s| s.labels.clone().collect()).collect();
     let mut usual: Vec<f64> = all
@@ -64,48 +66,66 @@ fn deviation(scene: &Scene<'_>, residuals: &[Residual], labels: &[usize], i: usi
     Some((residuals[labels[i]] - predicted).norm() / factor)
 }
 
-/// Finds outliers of a fit: labels by their neighbours, key labels by what a shift of each would explain.
+/// Weights by the neighbours of the labels alone.
+pub(super) fn by_neighbours(work: &Work<'_, '_>, residuals: &[Residual]) -> Weights {
+    let far = labels(work.scene, residuals);
+    let labels = far.iter().map(|far| if *far { RAISED } else { 1.0 }).collect();
+    work.without_dead(Weights { labels, keys: vec![1.0; work.scene.segments.len()] })
+}
+
+/// Finds outliers of a fit: labels by their neighbours, labels and key labels by what a shift of each would explain.
 pub(super) fn find(work: &Work<'_, '_>, fit: &Fit) -> Weights {
-    let far = labels(work.scene, &fit.residuals_now());
-    let raised = |far: &bool| if *far { RAISED } else { 1.0 };
-    let mut weights =
-        Weights { labels: far.iter().map(raised).collect(), keys: vec![1.0; work.scene.segments.len()] };
-    let most = ((work.scene.segments.len() as f64 * MOST_KEYS) as usize).max(1);
-    let mut found = 0;
-    for _ in 0..5 {
-        let scores = key_scores(work, fit, &weights);
-        let mut sorted: Vec<f64> = scores.clone();
-        sorted.sort_by(f64::total_cmp);
-        // The median of chi-square with two degrees of freedom is 1.39.
-        let high = (sorted.get(sorted.len() / 2).copied().unwrap_or(0.0) / 1.39).max(1.0);
-        let mut worst: Vec<(f64, usize)> = scores
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| weights.keys[*i] == 1.0)
-            .map(|(i, s)| (s / high, i))
-            .filter(|(s, _)| *s > FAR_KEY)
-            .collect();
-        worst.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let Some(largest) = worst.first().map(|w| w.0) else { break };
-        for (score, i) in worst {
-            if found < most && score > 0.6 * largest {
-                weights.keys[i] = RAISED;
-                found += 1;
-            }
-        }
-        if found >= most {
+    let mut weights = by_neighbours(work, &fit.residuals_now());
+    let most_keys = ((work.scene.segments.len() as f64 * MOST_KEYS) as usize).max(1);
+    let most_labels = work.scene.labels.len().div_ceil(10);
+    for _ in 0..4 {
+        let keys = raise(work, fit, &mut weights, Shifts::Keys, most_keys);
+        let labels = raise(work, fit, &mut weights, Shifts::Labels, most_labels);
+        if !keys && !labels {
             break;
         }
     }
     weights
 }
 
-/// Chi-square of a shift of each key label beside the parameters of a fit.
-fn key_scores(work: &Work<'_, '_>, fit: &Fit, weights: &Weights) -> Vec<f64> {
+/// Raises the variance of those whose shift explains most; whether there were any.
+fn raise(work: &Work<'_, '_>, fit: &Fit, weights: &mut Weights, shifts: Shifts, most: usize) -> bool {
+    let scores = scores(work, fit, weights, shifts);
+    let (own, limit) = match shifts {
+        Shifts::Labels => (&mut weights.labels, FAR_LABEL),
+        _ => (&mut weights.keys, FAR_KEY),
+    };
+    let mut sorted: Vec<f64> = scores.clone();
+    sorted.sort_by(f64::total_cmp);
+    // The median of chi-square with two degrees of freedom is 1.39.
+    let high = (sorted.get(sorted.len() / 2).copied().unwrap_or(0.0) / 1.39).max(1.0);
+    let found = own.iter().filter(|w| **w > 1.0).count();
+    let mut worst: Vec<(f64, usize)> = scores
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| own[*i] == 1.0)
+        .map(|(i, s)| (s / high, i))
+        .filter(|(s, _)| *s > limit)
+        .collect();
+    worst.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let largest = worst.first().map_or(0.0, |w| w.0);
+    let mut any = false;
+    for (score, i) in worst.into_iter().take(most.saturating_sub(found)) {
+        // What one outlier leaves in those beside it goes with it.
+        if score > 0.5 * largest {
+            own[i] = RAISED;
+            any = true;
+        }
+    }
+    any
+}
+
+/// Chi-square of a shift of each label or key label beside the parameters of a fit.
+fn scores(work: &Work<'_, '_>, fit: &Fit, weights: &Weights, shifts: Shifts) -> Vec<f64> {
     let columns: Vec<&[Residual]> =
         std::iter::once(fit.residuals.as_slice()).chain(fit.columns.iter().map(Vec::as_slice)).collect();
     let sizes = work.noise.sizes(&fit.logs);
-    let whitened = whiten(&work.geometry, &columns, &sizes, weights, &fit.jumps, true);
+    let whitened = whiten(&work.geometry, &columns, &sizes, weights, &fit.jumps, shifts);
     let p = fit.parameters.len();
     let all: Vec<usize> = (1..=p).collect();
     let solution = Normal::of(&whitened, &all).solve(&fit.linearised_at(), &expected_of(&fit.parameters));

@@ -1,7 +1,7 @@
 //! From hypotheses to the document.
 
 use super::document::{
-    DiagnosisDocument, Estimated, FlawPart, LabelsPart, OdometryPart, Overlap, SCHEMA, Verdict, VerdictKind,
+    DiagnosisDocument, Estimated, FlawPart, HypothesisPart, LabelsPart, OdometryPart, Overlap, SCHEMA, Verdict, VerdictKind,
 };
 use super::fit::{Fit, Work};
 use super::flaw::{Flaw, PARAMETERS};
@@ -14,6 +14,8 @@ use super::{Diagnosed, Diagnosis, Gross, Prepared, words};
 /// Half the width of a 95 % interval in posterior deviations: the sizes of the noise are estimated, and the model is no
 /// truth.
 const HALF_WIDTH: f64 = 2.5;
+/// So many hypotheses are listed.
+const MOST_HYPOTHESES: usize = 8;
 /// An overlap that is worth a word.
 const LARGE_OVERLAP: f64 = 0.5;
 /// A second flaw beside a convention needs this share.
@@ -32,7 +34,7 @@ pub(super) fn diagnosed(
     let best = &search.ranked[0].fit;
     let labels_rmse_px = labels_rmse_px(work, best);
     let none = search.ranked.iter().find(|r| r.fit.flaws.is_empty());
-    let taken_px = none.map_or(prepared.rmse_px, |r| rms(&r.fit.residuals));
+    let taken_px = none.map_or(prepared.rmse_px, |r| work.rms(&r.fit.residuals));
     let decision = decide(search, &work.noise, taken_px, labels_rmse_px);
     let reporter = Reporter { work, search, labels_rmse_px, rmse_px: prepared.rmse_px };
     let (verdict, theta) =
@@ -58,6 +60,7 @@ pub(super) fn diagnosed(
         odometry: odometry(work, best),
         flaws: singles.iter().map(|r| reporter.part(&r.fit, r.fit.flaws[0])).collect(),
         overlaps: overlaps(&singles),
+        hypotheses: reporter.hypotheses(),
         verdict,
     };
     for (flaw, why) in &search.refused {
@@ -65,10 +68,6 @@ pub(super) fn diagnosed(
     }
     let conventions = gross.conventions.clone();
     Diagnosed { document, theta, conventions }
-}
-
-fn rms(residuals: &[super::scene::Residual]) -> f64 {
-    (residuals.iter().map(|r| r.norm_squared()).sum::<f64>() / residuals.len().max(1) as f64).sqrt()
 }
 
 pub(super) fn labels_part(prepared: &Prepared<'_>, work: &Work<'_, '_>) -> LabelsPart {
@@ -80,7 +79,7 @@ pub(super) fn labels_part(prepared: &Prepared<'_>, work: &Work<'_, '_>) -> Label
     points.sort_unstable();
     points.dedup();
     let times = || scene.labels.iter().map(|l| scene.frames[l.frame].t_s);
-    let raised = |w: &Vec<f64>| w.iter().filter(|w| **w > 1.0).count();
+    let raised = |w: &Vec<f64>| w.iter().filter(|w| **w > 1.0 && **w < 1e6).count();
     LabelsPart {
         scored: prepared.scored,
         points: points.len(),
@@ -98,7 +97,9 @@ fn labels_rmse_px(work: &Work<'_, '_>, best: &Fit) -> f64 {
     let residuals = best.residuals_now();
     let white = sizes.white_px.powi(2);
     let mut sum = 0.0;
-    for (i, label) in work.scene.labels.iter().enumerate() {
+    let mut count = 0;
+    for (i, label) in work.scene.labels.iter().enumerate().filter(|(i, _)| !work.dead[*i]) {
+        count += 1;
         let key = &work.geometry.segments[label.segment].by_pixel;
         let answer = &work.geometry.labels[i];
         let moved: f64 =
@@ -109,7 +110,7 @@ fn labels_rmse_px(work: &Work<'_, '_>, best: &Fit) -> f64 {
         let aside = work.weights.labels[i] > 1.0 || work.weights.keys[label.segment] > 1.0;
         sum += if aside { residuals[i].norm_squared().max(expected) } else { expected };
     }
-    (sum / work.scene.labels.len().max(1) as f64).sqrt()
+    (sum / f64::from(count.max(1))).sqrt()
 }
 
 /// RMS of how a coordinate moves by a second's walk of the position.
@@ -144,6 +145,24 @@ struct Reporter<'r, 's, 'a> {
 }
 
 impl Reporter<'_, '_, '_> {
+    fn hypotheses(&self) -> Vec<HypothesisPart> {
+        let none = self.search.ranked.iter().find(|r| r.fit.flaws.is_empty());
+        let at_best = |fit: &Fit| fit.score - fit.solution.evidence + fit.solution.likelihood;
+        let part = |ranked: &Ranked| {
+            let fit = &ranked.fit;
+            HypothesisPart {
+                flaws: fit.flaws.clone(),
+                share: ranked.posterior,
+                likelier: none.map_or(0.0, |n| fit.score - n.fit.score),
+                likelier_at_best: none.map_or(0.0, |n| at_best(fit) - at_best(&n.fit)),
+                rmse_px: self.work.rms(&fit.residuals_now()),
+                noise_times: fit.logs.map(f64::exp),
+                jumps: fit.jumps.len(),
+            }
+        };
+        self.search.ranked.iter().take(MOST_HYPOTHESES).map(part).collect()
+    }
+
     /// What one flaw of a fit comes to.
     fn part(&self, fit: &Fit, flaw: Flaw) -> FlawPart {
         let values = fit.values();
@@ -182,13 +201,13 @@ impl Reporter<'_, '_, '_> {
             Estimated { name, value: length, low: (length - half).max(0.0), high: length + half }
         });
         let none = self.search.ranked.iter().find(|r| r.fit.flaws.is_empty());
-        let rmse_px = rms(&fit.residuals_now());
-        let before = none.map_or(self.rmse_px, |r| rms(&r.fit.residuals));
+        let rmse_px = self.work.rms(&fit.residuals_now());
+        let before = none.map_or(self.rmse_px, |r| self.work.rms(&r.fit.residuals));
         let effects: Vec<f64> = flaw
             .solved()
             .filter_map(|p| {
                 let i = fit.parameters.iter().position(|q| *q == p)?;
-                Some(PARAMETERS[p].typical * rms(&fit.columns[i]))
+                Some(PARAMETERS[p].typical * self.work.rms(&fit.columns[i]))
             })
             .collect();
         let alone = fit.flaws.len() == 1;
@@ -218,7 +237,7 @@ impl Reporter<'_, '_, '_> {
         let best = &self.search.ranked[0];
         let none = share(self.search, &[]);
         let sets = share(self.search, &best.fit.flaws);
-        let left_px = rms(&best.fit.residuals_now());
+        let left_px = self.work.rms(&best.fit.residuals_now());
         let base = Verdict {
             kind: VerdictKind::NoFlaw,
             flaws: vec![],
@@ -254,10 +273,11 @@ impl Reporter<'_, '_, '_> {
             return self.convention(decision, gross, base, named);
         }
         let noise = self.noise_words(&best.fit);
-        if gross.lost > MANY_LOST {
+        let lost = self.work.dead.iter().filter(|d| **d).count() as f64 / self.work.dead.len().max(1) as f64;
+        if lost > MANY_LOST {
             let sentence = format!(
                 "none of the causes looked for explains this: {:.0} % of the labels' points fall behind the camera or have no depth",
-                100.0 * gross.lost
+                100.0 * lost
             );
             return (Verdict { kind: VerdictKind::Unexplained, sentence, ..base }, Theta::zero());
         }
@@ -396,7 +416,7 @@ impl Reporter<'_, '_, '_> {
         named: impl Fn(&Fit) -> (Vec<FlawPart>, Vec<String>),
     ) -> (Verdict, Theta) {
         let best = &self.search.ranked[0];
-        let left_px = rms(&best.fit.residuals_now());
+        let left_px = self.work.rms(&best.fit.residuals_now());
         let words: Vec<String> = gross.conventions.iter().map(|c| c.words()).collect();
         let list = crate::conventions::list_text(&gross.conventions);
         let mut flaws: Vec<String> =
@@ -412,7 +432,7 @@ impl Reporter<'_, '_, '_> {
             flaws.extend(best.fit.flaws.iter().map(|f| f.name().to_string()));
         }
         let none = self.search.ranked.iter().find(|r| r.fit.flaws.is_empty());
-        let cured_px = if beside { left_px } else { none.map_or(left_px, |r| rms(&r.fit.residuals)) };
+        let cured_px = if beside { left_px } else { none.map_or(left_px, |r| self.work.rms(&r.fit.residuals)) };
         let sentence = format!(
             "most likely {}{also}: {:.2} px become {cured_px:.2} px with --estimate-as {list}",
             words.join(", and "),

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::filter::Weights;
+use super::gross::independent;
 use super::fit::{Fit, Normal, Work, expected_of, parameters_of};
 use super::flaw::Flaw;
 use super::noise::Logs;
@@ -18,6 +19,8 @@ const CLOSE_FOR_JUMPS: f64 = 40.0;
 /// Pairs this close to the best hypothesis are fitted in full, and at most so many.
 const CLOSE_PAIR: f64 = 12.0;
 const MOST_PAIRS: usize = 5;
+/// A flaw more must be nearer by this, as a logarithm of a robust likelihood.
+const NEARER: f64 = 1.5;
 /// Prior of no flaw, of one, of two.
 const NONE: f64 = 0.35;
 const ONE: f64 = 0.5;
@@ -65,40 +68,33 @@ pub(super) fn search(
     let zero = Theta::zero();
     let logs: Logs = [0.0; 6];
     let base = work.residuals(&zero)?;
-    let far = outliers::labels(work.scene, &base);
-    work.weights = Weights {
-        labels: far.iter().map(|far| if *far { 400.0 } else { 1.0 }).collect(),
-        keys: vec![1.0; work.scene.segments.len()],
-    };
+    work.weights = outliers::by_neighbours(work, &base);
     let steps = 6;
     progress(0, steps);
-    let sets: Vec<Vec<Flaw>> =
-        std::iter::once(vec![]).chain(flaws.iter().map(|f| vec![*f])).collect();
-    let mut refused = Vec::new();
-    let mut fits = Vec::new();
-    let first: Vec<Result<Fit, DiagnoseError>> = sets
-        .par_iter()
-        .map(|set| {
-            let from = set.first().map_or(zero, |flaw| start(work, *flaw, &zero));
-            work.newton(set, &from, &logs, &[], 4)
-        })
-        .collect();
-    for (set, fit) in sets.iter().zip(first) {
-        match (fit, set.first()) {
-            (Ok(fit), _) => fits.push(fit),
-            (Err(DiagnoseError::CannotEvaluate(why)), Some(flaw)) => refused.push((*flaw, why)),
-            (Err(error), _) => return Err(error),
-        }
+    let (mut fits, refused) = singles(work, flaws, &logs)?;
+    // How pixels move with a pose is taken where the labels fit best, and not where nothing does.
+    let nearest = nearest(&fits, work.scene.labels.len()).clone();
+    if !nearest.flaws.is_empty() {
+        move_to(work, &nearest.values())?;
+        fits = again(work, fits, 3);
     }
     progress(1, steps);
-    work.weights = shared_outliers(work, &fits);
-    fits = again(work, fits, 2);
+    let second = pairs(work, &fits, flaws, 3, false);
+    fits.extend(second);
+    let nearest = self::nearest(&fits, work.scene.labels.len()).clone();
+    if nearest.flaws.len() == 2 {
+        move_to(work, &nearest.values())?;
+        fits = again(work, fits, 1);
+    }
     progress(2, steps);
-    fits = sized(work, fits);
+    work.weights = shared_outliers(work, &fits, &nearest.flaws);
+    fits = again(work, fits, 2);
+    fits = same_sizes(work, fits);
     progress(3, steps);
     // Once more, now that the noise is known.
     let best = best_of(&fits);
     work.weights = outliers::find(work, &fits[best]);
+    fits.retain(|f| f.flaws.len() < 2);
     fits = again(work, fits, 1);
     fits = sized(work, fits);
     let close = best_score(&fits) - CLOSE_FOR_JUMPS;
@@ -107,7 +103,7 @@ pub(super) fn search(
         .map(|fit| if fit.score > close { work.with_jumps(fit, MOST_JUMPS) } else { fit })
         .collect();
     progress(4, steps);
-    let pairs = pairs(work, &fits, flaws);
+    let pairs = pairs(work, &fits, flaws, MOST_PAIRS, true);
     fits.extend(pairs);
     progress(steps, steps);
     let mut ranked: Vec<Ranked> = fits
@@ -129,16 +125,61 @@ fn best_score(fits: &[Fit]) -> f64 {
     fits.iter().map(|f| f.score).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// All hypotheses must get the same outliers: those of the likelier of two bases, the best robust fit and no flaw with
-/// jumps.
-fn shared_outliers(work: &Work<'_, '_>, fits: &[Fit]) -> Weights {
-    let robust = fits
-        .iter()
-        .map(|fit| (robust_cost(&fit.residuals_now()), fit))
-        .min_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, fit)| fit);
+/// No flaw and each alone, from the best of many starts.
+fn singles(
+    work: &Work<'_, '_>,
+    flaws: &[Flaw],
+    logs: &Logs,
+) -> Result<(Vec<Fit>, Vec<(Flaw, String)>), DiagnoseError> {
+    let zero = Theta::zero();
+    let sets: Vec<Vec<Flaw>> = std::iter::once(vec![]).chain(flaws.iter().map(|f| vec![*f])).collect();
+    let first: Vec<Result<Fit, DiagnoseError>> = sets
+        .par_iter()
+        .map(|set| {
+            let from = set.first().map_or(zero, |flaw| start(work, *flaw, &zero));
+            work.newton(set, &from, logs, &[], 4)
+        })
+        .collect();
+    let (mut fits, mut refused) = (Vec::new(), Vec::new());
+    for (set, fit) in sets.iter().zip(first) {
+        match (fit, set.first()) {
+            (Ok(fit), _) => fits.push(fit),
+            (Err(DiagnoseError::CannotEvaluate(why)), Some(flaw)) => refused.push((*flaw, why)),
+            (Err(error), _) => return Err(error),
+        }
+    }
+    Ok((fits, refused))
+}
+
+/// The fit that leaves least by a robust measure; no flaw unless one is clearly better, one flaw unless two are.
+fn nearest(fits: &[Fit], labels: usize) -> &Fit {
+    let cost = |fit: &Fit| {
+        robust_cost(&fit.residuals_now()) * independent(labels) + NEARER * fit.flaws.len() as f64
+    };
+    let mut best = &fits[0];
+    for fit in fits {
+        if cost(fit) < cost(best) {
+            best = fit;
+        }
+    }
+    best
+}
+
+/// Takes the geometry at other values, and outliers by neighbours there.
+fn move_to(work: &mut Work<'_, '_>, theta: &Theta) -> Result<(), DiagnoseError> {
+    if let Ok(moved) = Work::new(work.scene, work.motion, work.noise, theta) {
+        *work = moved;
+        let residuals = work.residuals(theta)?;
+        work.weights = outliers::by_neighbours(work, &residuals);
+    }
+    Ok(())
+}
+
+/// All hypotheses must get the same outliers: those of the likelier of two bases, the nearest fit and no flaw with jumps.
+fn shared_outliers(work: &Work<'_, '_>, fits: &[Fit], nearest: &[Flaw]) -> Weights {
+    let nearest = fits.iter().find(|f| f.flaws == nearest);
     let none = fits.iter().find(|f| f.flaws.is_empty());
-    let bases: Vec<Fit> = robust.into_iter().chain(none).cloned().collect();
+    let bases: Vec<Fit> = nearest.into_iter().chain(none).cloned().collect();
     let tried: Vec<(f64, Weights)> = bases
         .into_par_iter()
         .map(|base| {
@@ -171,33 +212,35 @@ fn again(work: &Work<'_, '_>, fits: Vec<Fit>, steps: usize) -> Vec<Fit> {
         .collect()
 }
 
+/// All of them with the sizes of the best one.
+fn same_sizes(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
+    let best = best_of(&fits);
+    let logs = work.sized(fits[best].clone(), 3).logs;
+    fits.into_par_iter().map(|fit| work.rescored(Fit { logs, ..fit })).collect()
+}
+
 /// With their own sizes, those that are close.
 fn sized(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
-    // The sizes of the best one are a good start for all.
     let best = best_of(&fits);
-    let first = work.sized(fits[best].clone(), 3);
-    let (logs, score) = (first.logs, first.score);
-    fits.into_par_iter()
+    let first = work.sized(fits[best].clone(), 2);
+    let limit = first.score - CLOSE;
+    let fits: Vec<Fit> = fits
+        .into_par_iter()
         .enumerate()
-        .map(|(i, fit)| {
-            if i == best {
-                return first.clone();
-            }
-            let (solution, _) = work.solve(&fit, &logs, &fit.jumps);
-            let (own, _) = work.solve(&fit, &fit.logs, &fit.jumps);
-            let fit = match solution.evidence + work.noise.prior(&logs) > own.evidence + work.noise.prior(&fit.logs) {
-                true => Fit { logs, solution, ..fit },
-                false => fit,
-            };
-            let fit = work.rescored(fit);
-            if fit.score > score - 4.0 * CLOSE { work.sized(fit, 2) } else { fit }
+        .map(|(i, fit)| match i == best {
+            true => first.clone(),
+            // Far from the best the best one's sizes are far from right.
+            false if fit.score > limit - 3.0 * CLOSE => work.sized(fit, 1),
+            false => fit,
         })
-        .collect()
+        .collect();
+    let limit = best_score(&fits) - CLOSE;
+    fits.into_par_iter().map(|fit| if fit.score > limit { work.sized(fit, 1) } else { fit }).collect()
 }
 
 /// The second flaws that matter, beside the three best.
-fn pairs(work: &Work<'_, '_>, fits: &[Fit], flaws: &[Flaw]) -> Vec<Fit> {
-    let mut order: Vec<usize> = (0..fits.len()).filter(|i| !fits[*i].flaws.is_empty()).collect();
+fn pairs(work: &Work<'_, '_>, fits: &[Fit], flaws: &[Flaw], most_pairs: usize, in_full: bool) -> Vec<Fit> {
+    let mut order: Vec<usize> = (0..fits.len()).filter(|i| fits[*i].flaws.len() == 1).collect();
     order.sort_by(|a, b| fits[*b].score.total_cmp(&fits[*a].score));
     let best = best_score(fits);
     let looked: Vec<(f64, Vec<Flaw>, usize)> = order
@@ -219,7 +262,7 @@ fn pairs(work: &Work<'_, '_>, fits: &[Fit], flaws: &[Flaw]) -> Vec<Fit> {
             other.sort_unstable();
             other == sorted
         });
-        if score > most - CLOSE_PAIR && !known && chosen.len() < MOST_PAIRS {
+        if score > most - CLOSE_PAIR && !known && chosen.len() < most_pairs {
             chosen.push((set, i));
         }
     }
@@ -227,10 +270,12 @@ fn pairs(work: &Work<'_, '_>, fits: &[Fit], flaws: &[Flaw]) -> Vec<Fit> {
         .into_par_iter()
         .filter_map(|(set, i)| {
             let of = &fits[i];
-            let fit = work.newton(&set, &of.values(), &of.logs, &of.jumps, 3).ok()?;
-            let fit = Fit { jump_gain: of.jump_gain, ..fit };
+            let fit = work.newton(&set, &of.values(), &of.logs, &[], 3).ok()?;
+            if !in_full {
+                return Some(fit);
+            }
             let fit = work.sized(fit, 2);
-            Some(work.with_jumps(fit, MOST_JUMPS - of.jumps.len().min(MOST_JUMPS)))
+            Some(work.with_jumps(fit, MOST_JUMPS))
         })
         .collect()
 }

@@ -5,14 +5,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::filter::Weights;
 use super::fit::Work;
 use super::flaw::{Flaw, PARAMETERS};
-use super::geometry::Geometry;
 use super::noise::NoiseModel;
 use super::outliers;
 use super::report::labels_part;
-use super::scene::Residual;
 use super::theta::Theta;
 use super::{DiagnoseError, Diagnosis, LabelsPart, Prepared, flaws_of};
 
@@ -89,24 +86,15 @@ pub fn sensitivity(
     let prepared = Prepared::new(diagnosis, &flaws)?;
     let (scene, motion) = (&prepared.scene, &prepared.motion);
     let zero = Theta::zero();
-    let mut work = Work {
-        scene,
-        motion,
-        geometry: Geometry::new(scene, &scene.view(&zero, motion)?, inertial.is_some()),
-        noise: NoiseModel { odometry: options.odometry_noise, inertial: inertial.is_some() },
-        weights: Weights::default(),
-    };
+    let noise = NoiseModel { odometry: options.odometry_noise, inertial: inertial.is_some() };
+    let mut work = Work::new(scene, motion, noise, &zero)?;
     let base = work.residuals(&zero)?;
-    let far = outliers::labels(scene, &base);
-    work.weights = Weights {
-        labels: far.iter().map(|far| if *far { 400.0 } else { 1.0 }).collect(),
-        keys: vec![1.0; scene.segments.len()],
-    };
+    work.weights = outliers::by_neighbours(&work, &base);
     // The noise that is there with nothing injected.
     let none = work.newton(&[], &zero, &[0.0; 6], &[], 0)?;
     let none = work.sized(none, 3);
     let labels = labels_part(&prepared, &work);
-    let now_px = rmse_px(&base);
+    let now_px = work.rms(&base);
     let mut curves = Vec::new();
     for (done, flaw) in flaws.iter().enumerate() {
         for parameter in flaw.solved() {
@@ -138,10 +126,6 @@ pub fn sensitivity(
     })
 }
 
-fn rmse_px(residuals: &[Residual]) -> f64 {
-    (residuals.iter().map(|r| r.norm_squared()).sum::<f64>() / residuals.len().max(1) as f64).sqrt()
-}
-
 /// RMSE_2D over injected sizes, nothing injected first.
 fn curve(work: &Work<'_, '_>, parameter: usize, now_px: f64) -> Result<Vec<CurvePoint>, DiagnoseError> {
     let mut points = vec![CurvePoint { size: 0.0, rmse_px: now_px }];
@@ -151,7 +135,7 @@ fn curve(work: &Work<'_, '_>, parameter: usize, now_px: f64) -> Result<Vec<Curve
         for sign in [-1.0, 1.0] {
             let mut theta = Theta::zero();
             theta[parameter] = sign * size;
-            sum += rmse_px(&work.residuals(&theta)?).powi(2);
+            sum += work.rms(&work.residuals(&theta)?).powi(2);
         }
         points.push(CurvePoint { size, rmse_px: (0.5 * sum).sqrt() });
     }
