@@ -80,38 +80,41 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         return Err(usage(format!("--apply {}: name a file that ends in .toml", apply.display())));
     }
     args.evaluation.with_evaluation(&scoring(), |evaluation, streams| {
-        let diagnosed = diagnose_all(evaluation, streams, &args.looking, verbosity)?;
-        if let ([_, _, ..], true) = (diagnosed.as_slice(), args.json.is_some() || args.apply.is_some()) {
+        let all = diagnose_all(evaluation, streams, &args.looking, verbosity);
+        if let ([_, _, ..], true) = (all.as_slice(), args.json.is_some() || args.apply.is_some()) {
             return Err(usage("--json and --apply take one --estimate and one --depth"));
         }
+        let (diagnosed, failed): (Vec<_>, Vec<_>) = all.into_iter().partition(Result::is_ok);
+        let diagnosed: Vec<Diagnosed> = diagnosed.into_iter().flatten().collect();
+        let mut failed: Vec<anyhow::Error> = failed.into_iter().filter_map(Result::err).collect();
         let mut texts = Vec::new();
         if let (Some(path), Some(one)) = (&args.json, diagnosed.first()) {
             texts.push((path, to_json(&one.document)?));
         }
-        // What cannot be applied is known before anything is written.
-        let corrected = match (&args.apply, diagnosed.first()) {
-            (Some(_), Some(one)) => Some(corrected(evaluation, streams, one)?),
-            _ => None,
-        };
-        if !outputs.write(&texts)? {
+        // What was found is never lost for what fails after it.
+        if (!diagnosed.is_empty() || failed.is_empty()) && !outputs.write(&texts)? {
             let text: Vec<String> = diagnosed.iter().map(|d| render(&d.document)).collect();
             terminal::print(&text.join("\n"))?;
         }
-        if let (Some(file), Some(path)) = (corrected, &args.apply) {
-            file.write(path, Overwrite::Replace)?;
+        if !failed.is_empty() {
+            let first = failed.remove(0);
+            return Err(failed.into_iter().fold(first, |all, next| anyhow::anyhow!("{all:#}; {next:#}")));
+        }
+        if let (Some(path), Some(one)) = (&args.apply, diagnosed.first()) {
+            corrected(evaluation, streams, one)?.write(path, Overwrite::Replace)?;
             verbosity.note(&format!("the correction is in {}: use it with --calibration", path.display()));
         }
         Ok(Outcome::Done)
     })
 }
 
-/// Each estimate with each depth source.
+/// Each estimate with each depth source, one that fails beside the others.
 fn diagnose_all(
     evaluation: &Evaluation<'_>,
     streams: &LoadedStreams,
     looking: &LookingArgs,
     verbosity: Verbosity,
-) -> anyhow::Result<Vec<Diagnosed>> {
+) -> Vec<anyhow::Result<Diagnosed>> {
     let flaws = looking.flaws();
     let mut all = Vec::new();
     for (stream, _) in evaluation.streams.iter().enumerate().filter(|(_, s)| s.role == Role::Estimate) {
@@ -126,10 +129,10 @@ fn diagnose_all(
             bar.finish_and_clear();
             let names =
                 || format!("{} with {}", evaluation.streams[stream].name, evaluation.depths[depth].name());
-            all.push(diagnosed.with_context(names)?);
+            all.push(diagnosed.with_context(names));
         }
     }
-    Ok(all)
+    all
 }
 
 /// The calibration in use without the named flaws.
@@ -153,7 +156,8 @@ fn corrected(
         Flaw::Distortion,
         Flaw::Aspect,
     ];
-    if let Some(flaw) = verdict.flaws.iter().find(|f| in_a_calibration.iter().all(|of| of.name() != f.as_str()))
+    if let Some(flaw) =
+        verdict.flaws.iter().find(|f| in_a_calibration.iter().all(|of| of.name() != f.as_str()))
     {
         anyhow::bail!(
             "--apply: {flaw} is a flaw of the estimate, which no calibration can correct: nothing is written"

@@ -100,7 +100,9 @@ pub(crate) fn axis(curve: &Curve) -> &'static str {
         | Flaw::Aspect
         | Flaw::ClockRate
         | Flaw::RollingShutter => "",
-        Flaw::Distortion => ["k1", "k2", "p1", "p2"].into_iter().find(|name| parts.contains(name)).unwrap_or(""),
+        Flaw::Distortion => {
+            ["k1", "k2", "p1", "p2"].into_iter().find(|name| parts.contains(name)).unwrap_or("")
+        }
         Flaw::Drift if parts.first() == Some(&"yaw") => "yaw",
         _ => ["x", "y", "z", "u", "v"].into_iter().find(|axis| parts.contains(axis)).unwrap_or(""),
     }

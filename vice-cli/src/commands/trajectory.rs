@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use serde::Serialize;
+use vice_core::conventions::{Convention, Given, cure, list_text, suspect};
 use vice_core::metrics::align::{Alignment, align};
 use vice_core::metrics::associate::{Matching, PosePairs, crop};
 use vice_core::metrics::plane::Plane;
@@ -72,6 +73,9 @@ pub(crate) struct Args {
     /// Measure the stretch along the reference instead of the estimate.
     #[arg(long)]
     pairs_from_reference: bool,
+    /// What the estimate is, where it was read as something else: inverse, wxyz, conjugate, mm, ned, ...
+    #[arg(long, value_name = "WHAT,...", value_delimiter = ',')]
+    estimate_as: Vec<Convention>,
     /// Times of KITTI files [default: times.txt beside each].
     #[arg(long, value_name = "FILE")]
     times: Option<PathBuf>,
@@ -127,6 +131,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     };
     let pairs = PosePairs::match_up(&reference, &estimate, matching, args.t_offset)
         .with_context(|| format!("{} against {}", args.estimate, args.reference))?;
+    if let Some(suspected) = suspect(&pairs, Given::default()) {
+        tracing::warn!("{}: {}", args.estimate, suspected.line());
+    }
     let n_to_align = args.n_to_align.map(|n| usize::try_from(n).unwrap_or(usize::MAX));
     let transform = align(&pairs, args.align, n_to_align)
         .with_context(|| format!("--align {} of {}", args.align.name(), args.estimate))?;
@@ -194,7 +201,9 @@ fn read_both(args: &Args) -> anyhow::Result<(Trajectory, Trajectory)> {
         (_, TrajectoryFormat::Kitti) => estimate = read(&args.estimate, false)?,
         _ => {}
     }
-    Ok((reference.trajectory, estimate.trajectory))
+    let estimate = cure(&args.estimate_as, &estimate.trajectory, Given::default())
+        .with_context(|| format!("--estimate-as {}", list_text(&args.estimate_as)))?;
+    Ok((reference.trajectory, estimate))
 }
 
 fn stamp(text: &str) -> Result<Stamp, String> {

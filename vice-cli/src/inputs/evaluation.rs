@@ -173,6 +173,10 @@ impl EvaluationArgs {
         if let Some(reference) = &self.streams.reference {
             other.insert("reference".to_string(), reference.clone());
         }
+        if !self.streams.estimate_as.is_empty() {
+            let list = vice_core::conventions::list_text(&self.streams.estimate_as);
+            other.insert("estimate-as".to_string(), list);
+        }
         if let Some(times) = &self.streams.times {
             other.insert("times".to_string(), times.display().to_string());
         }

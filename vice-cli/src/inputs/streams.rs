@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use nalgebra::Vector3;
+use vice_core::conventions::{Convention, Given, cure, list_text};
 use vice_core::dataset::{Dataset, GROUND_TRUTH};
 use vice_core::diagnose::InertialRun;
 use vice_core::evaluate::{Selection, Stream};
@@ -38,6 +39,9 @@ pub(crate) struct StreamArgs {
     /// Whose poses the files give: body, camera, or a file with body_from_estimate (4x4).
     #[arg(long, value_name = "body|camera|FILE", default_value = "body")]
     pub(crate) estimate_frame: String,
+    /// What the estimates are, where they were read as something else: inverse, wxyz, conjugate, camera, mm, ned, ...
+    #[arg(long, value_name = "WHAT,...", value_delimiter = ',')]
+    pub(crate) estimate_as: Vec<Convention>,
     /// Times of KITTI files [default: times.txt beside each].
     #[arg(long, value_name = "FILE")]
     pub(crate) times: Option<PathBuf>,
@@ -87,6 +91,11 @@ pub(crate) fn load_streams(
     for name in split_list(&args.estimate) {
         let trajectory = match name == IMU_EULER && !loader.is_stream(&name) {
             true => {
+                if !args.estimate_as.is_empty() {
+                    return Err(usage(format!(
+                        "--estimate-as says nothing of {IMU_EULER}, which is integrated here"
+                    )));
+                }
                 let run = loader.imu_euler()?;
                 let trajectory = run
                     .integrate(Span::ZERO, Vector3::zeros())
@@ -144,7 +153,20 @@ impl Loader<'_> {
             true => self.dataset.trajectory(name)?,
             false => self.to_body(self.file(name, "--estimate")?)?,
         };
+        let trajectory = self.as_meant(trajectory)?;
         trajectory.shifted(self.time_offset).with_context(|| format!("{name} with --time-offset"))
+    }
+
+    /// The poses that were meant. Said by the user, never guessed.
+    fn as_meant(&self, trajectory: Trajectory) -> anyhow::Result<Trajectory> {
+        if self.args.estimate_as.is_empty() {
+            return Ok(trajectory);
+        }
+        let extrinsics = |stamp: Stamp| self.body_from_camera(stamp).ok();
+        let first_frame = self.used.frames.first().copied();
+        let given = Given { body_from_camera: Some(&extrinsics), first_frame };
+        cure(&self.args.estimate_as, &trajectory, given)
+            .with_context(|| format!("--estimate-as {}", list_text(&self.args.estimate_as)))
     }
 
     fn is_stream(&self, name: &str) -> bool {

@@ -179,7 +179,8 @@ mod tests {
     fn misread(convention: Convention, right: &Trajectory) -> Trajectory {
         let map = |f: &dyn Fn(WorldFromBody) -> WorldFromBody| right.map_poses(|_, pose| f(pose));
         let times = |k: i64| {
-            Trajectory::from_poses(right.iter().map(|(s, p)| (Stamp::from_nanos(s.as_nanos() / k), p))).unwrap()
+            Trajectory::from_poses(right.iter().map(|(s, p)| (Stamp::from_nanos(s.as_nanos() / k), p)))
+                .unwrap()
         };
         match convention {
             // x y z w of the reader are w x y z of the file.
@@ -204,9 +205,9 @@ mod tests {
                 map(&|p| Rigid::from_parts(p.translation(), p.rotation().inverse()))
             }
             Convention::InversePose => map(&|p| p.inverse().reinterpret()),
-            Convention::AxisOrder(axes) => map(&|p| {
-                Rigid::from_parts(axes.matrix().transpose() * p.translation(), p.rotation())
-            }),
+            Convention::AxisOrder(axes) => {
+                map(&|p| Rigid::from_parts(axes.matrix().transpose() * p.translation(), p.rotation()))
+            }
             Convention::LeftHanded(axis) => map(&|p| {
                 // A mirrored axis turns the other two components of the rotation's axis round.
                 let signs = Vector3::from_fn(|i, _| if i == usize::from(axis) { 1.0 } else { -1.0 });
@@ -218,9 +219,9 @@ mod tests {
                 let turn = rotation(&axes.matrix().transpose()).unwrap();
                 Rigid::from_parts(turn * p.translation(), turn * p.rotation())
             }),
-            Convention::BodyAxes(axes) => map(&|p| {
-                Rigid::from_parts(p.translation(), p.rotation() * rotation(&axes.matrix()).unwrap())
-            }),
+            Convention::BodyAxes(axes) => {
+                map(&|p| Rigid::from_parts(p.translation(), p.rotation() * rotation(&axes.matrix()).unwrap()))
+            }
             Convention::CameraAsBody => map(&|p| p * extrinsics().reinterpret()),
             Convention::BodyAsCamera => map(&|p| p * extrinsics().inverse().reinterpret()),
             Convention::StampsFromZero => {
@@ -256,10 +257,9 @@ mod tests {
     fn the_order_of_the_list_does_not_matter() {
         let right = flight();
         let both = misread(Convention::WFirst, &misread(Convention::InversePose, &right));
-        for list in [
-            [Convention::WFirst, Convention::InversePose],
-            [Convention::InversePose, Convention::WFirst],
-        ] {
+        for list in
+            [[Convention::WFirst, Convention::InversePose], [Convention::InversePose, Convention::WFirst]]
+        {
             let cured = cure(&list, &both, Given::default()).unwrap();
             let off = cured.poses()[7].translation() - right.poses()[7].translation();
             assert!(off.norm() < 1e-9);

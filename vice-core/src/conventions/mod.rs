@@ -176,7 +176,9 @@ impl Convention {
         let text = match self {
             Self::WFirst => "the quaternions are written w first, and were read w last",
             Self::WLast => "the quaternions are written w last, and were read w first",
-            Self::ConjugateQuaternion => "the quaternions are conjugated (body_from_world beside the right position)",
+            Self::ConjugateQuaternion => {
+                "the quaternions are conjugated (body_from_world beside the right position)"
+            }
             Self::Degrees => "the angles are degrees that were read as radians",
             Self::Radians => "the angles are radians that were read as degrees",
             Self::Millimetres => "the positions are in millimetres",
@@ -296,9 +298,7 @@ impl FromStr for Convention {
         match all().find(|c| c.to_string() == text) {
             Some(found) if found.curable() => Ok(found),
             Some(found) => Err(format!("`{text}` cannot be mended: {}", found.words())),
-            None => {
-                Err(format!("unknown convention `{text}`; known: {}", Self::known_words().join(", ")))
-            }
+            None => Err(format!("unknown convention `{text}`; known: {}", Self::known_words().join(", "))),
         }
     }
 }
@@ -340,10 +340,7 @@ mod tests {
         }
         assert!("frozen".parse::<Convention>().unwrap_err().contains("cannot be mended"));
         assert!("upside".parse::<Convention>().unwrap_err().contains("conjugate"));
-        assert_eq!(
-            parse_list("inverse, wxyz").unwrap(),
-            [Convention::InversePose, Convention::WFirst]
-        );
+        assert_eq!(parse_list("inverse, wxyz").unwrap(), [Convention::InversePose, Convention::WFirst]);
         assert!(parse_list("mm,mm").is_err() && parse_list("").is_err());
         assert_eq!(list_text(&[Convention::InversePose, Convention::WFirst]), "inverse,wxyz");
     }

@@ -71,7 +71,8 @@ pub fn suspect(pairs: &PosePairs, given: Given<'_>) -> Option<Suspected> {
     };
     let tried: Vec<(Convention, Vec<WorldFromBody>)> =
         Convention::TRIED.into_iter().filter_map(|c| Some((c, cured(c)?))).collect();
-    by_rotations(&reference, &estimate, &tried).or_else(|| by_positions(&stamps, &reference, &estimate, &tried))
+    by_rotations(&reference, &estimate, &tried)
+        .or_else(|| by_positions(&stamps, &reference, &estimate, &tried))
 }
 
 fn by_rotations(
@@ -129,8 +130,7 @@ fn by_positions(
         let pairs = stamps.iter().zip(reference).zip(poses).map(|((s, r), e)| (*s, *r, *e));
         let pairs = PosePairs::new(pairs).ok()?;
         let aligned = align(&pairs, Alignment::Se3, None).ok()?.apply_to(&pairs);
-        let sum: f64 =
-            aligned.iter().map(|(r, e)| (r.translation() - e.translation()).norm_squared()).sum();
+        let sum: f64 = aligned.iter().map(|(r, e)| (r.translation() - e.translation()).norm_squared()).sum();
         Some((sum / aligned.len() as f64).sqrt())
     };
     let middle = reference.iter().map(WorldFromBody::translation).sum::<nalgebra::Vector3<f64>>()
@@ -143,12 +143,14 @@ fn by_positions(
     if as_read < 0.5 * spread {
         return None;
     }
-    let best = tried
-        .iter()
-        .filter_map(|(c, poses)| Some((*c, error(poses)?)))
-        .min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (best.1 < SHARE * as_read && best.1 < 0.1 * spread)
-        .then_some(Suspected { convention: best.0, by_rotations: false, as_read, cured: best.1 })
+    let best =
+        tried.iter().filter_map(|(c, poses)| Some((*c, error(poses)?))).min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (best.1 < SHARE * as_read && best.1 < 0.1 * spread).then_some(Suspected {
+        convention: best.0,
+        by_rotations: false,
+        as_read,
+        cured: best.1,
+    })
 }
 
 /// RMS angle between the turns of both streams over steps of a twentieth of the run; `None` where the reference hardly

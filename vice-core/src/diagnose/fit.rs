@@ -243,7 +243,8 @@ impl Work<'_, '_> {
     }
 
     fn score(&self, solution: &Solution, logs: &Logs, jumps: &[Jump]) -> f64 {
-        solution.evidence + self.noise.prior(logs) - jumps.len() as f64 * jump_cost(self.geometry.frames.len())
+        solution.evidence + self.noise.prior(logs)
+            - jumps.len() as f64 * jump_cost(self.geometry.frames.len())
     }
 
     /// The same work, to be changed.
@@ -308,12 +309,8 @@ impl Work<'_, '_> {
             let all: Vec<usize> = (1..whitened.width).collect();
             let normal = Normal::of(&whitened, &all);
             let solution = normal.solve(&fit.linearised_at(), &expected);
-            let pull: f64 = fit
-                .linearised_at()
-                .iter()
-                .zip(&expected)
-                .map(|(x, s)| (x / (WIDE_TIMES * s)).powi(2))
-                .sum();
+            let pull: f64 =
+                fit.linearised_at().iter().zip(&expected).map(|(x, s)| (x / (WIDE_TIMES * s)).powi(2)).sum();
             let cost = normal.squares + pull;
             let score = self.score(&solution, logs, jumps);
             let fit = Fit { solution, score, ..fit };
@@ -322,7 +319,8 @@ impl Work<'_, '_> {
                     // Too far: half of the way, from where it was best.
                     for (parameter, step) in parameters.iter().zip(kept.solution.step.iter()) {
                         let whole = kept.theta[*parameter] + step;
-                        let share = (theta[*parameter] - kept.theta[*parameter]) / (whole - kept.theta[*parameter]);
+                        let share =
+                            (theta[*parameter] - kept.theta[*parameter]) / (whole - kept.theta[*parameter]);
                         let share = if share.is_finite() { 0.4 * share } else { 0.0 };
                         theta[*parameter] = kept.theta[*parameter] + share * step;
                     }
@@ -330,9 +328,12 @@ impl Work<'_, '_> {
                 }
                 _ => {}
             }
-            let done = fit.solution.step.iter().zip(&parameters).all(|(s, p)| {
-                s.abs() < 0.02 * PARAMETERS[*p].typical
-            });
+            let done = fit
+                .solution
+                .step
+                .iter()
+                .zip(&parameters)
+                .all(|(s, p)| s.abs() < 0.02 * PARAMETERS[*p].typical);
             theta = fit.values();
             let better = best.as_ref().is_none_or(|(least, _)| cost <= *least);
             if better {
@@ -417,7 +418,9 @@ impl Work<'_, '_> {
             // Where three frames together are worst.
             let sum = |f: usize| excess[f.saturating_sub(1)..(f + 2).min(frames)].iter().sum::<f64>();
             let Some(worst) = (1..frames).max_by(|a, b| sum(*a).total_cmp(&sum(*b))) else { break };
-            let rows = |f: usize| whitened.frame_rows[(f + 2).min(frames)] - whitened.frame_rows[f.saturating_sub(1)];
+            let rows = |f: usize| {
+                whitened.frame_rows[(f + 2).min(frames)] - whitened.frame_rows[f.saturating_sub(1)]
+            };
             if sum(worst) < EXCESS * (2.0 * rows(worst) as f64).sqrt() {
                 break;
             }
@@ -429,7 +432,12 @@ impl Work<'_, '_> {
                     m: 0.08,
                     rad: 1.2_f64.to_radians(),
                 })
-                .chain([Jump { from: worst.saturating_sub(1).max(1), to: worst.saturating_sub(1).max(1), m: 0.08, rad: 1.2_f64.to_radians() }])
+                .chain([Jump {
+                    from: worst.saturating_sub(1).max(1),
+                    to: worst.saturating_sub(1).max(1),
+                    m: 0.08,
+                    rad: 1.2_f64.to_radians(),
+                }])
                 .collect();
             let best = tries
                 .par_iter()

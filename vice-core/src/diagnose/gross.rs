@@ -111,7 +111,8 @@ fn unusual(scene: &Scene<'_>, trajectory: &Trajectory) -> f64 {
         0.5 * off * off
     };
     // A robot that stands is no other unit.
-    let mut sum = if speed > SPEED_M_S { beyond(speed, SPEED_M_S) } else { beyond(speed.max(0.02), SPEED_M_S) };
+    let mut sum =
+        if speed > SPEED_M_S { beyond(speed, SPEED_M_S) } else { beyond(speed.max(0.02), SPEED_M_S) };
     if scene.own_anchor {
         let mut heights: Vec<f64> = trajectory.poses().iter().map(|p| p.translation().z.abs()).collect();
         heights.sort_by(f64::total_cmp);

@@ -19,6 +19,7 @@ mod fit;
 mod flaw;
 mod geometry;
 mod gross;
+mod mend;
 mod motion;
 mod noise;
 mod outliers;
@@ -32,10 +33,11 @@ mod verdict;
 mod words;
 
 pub use document::{
-    CauseName, DiagnosisDocument, Estimated, FlawPart, HypothesisPart, LabelsPart, OdometryPart, Overlap, SCHEMA, Verdict,
-    VerdictKind,
+    CauseName, DiagnosisDocument, Estimated, FlawPart, HypothesisPart, LabelsPart, OdometryPart, Overlap,
+    SCHEMA, Verdict, VerdictKind,
 };
 pub use flaw::{Flaw, PARAMETER_COUNT, PARAMETERS, ParameterInfo};
+pub use mend::mend;
 pub use motion::InertialRun;
 pub use noise::OdometryNoise;
 pub use sensitivity::{Curve, CurvePoint, SENSITIVITY_SCHEMA, SensitivityDocument, sensitivity};
@@ -58,7 +60,9 @@ use crate::evaluate::{EvaluateError, Evaluation};
 #[non_exhaustive]
 pub enum DiagnoseError {
     /// Nothing can be scored at all.
-    #[error("no label can be scored, so that there is nothing to diagnose: see the reasons that `vice evaluate` lists")]
+    #[error(
+        "no label can be scored, so that there is nothing to diagnose: see the reasons that `vice evaluate` lists"
+    )]
     NothingScored,
     /// No flaw is left to look for.
     #[error("no flaw is left to look for: an initial tilt is only fitted to an inertial estimate")]
@@ -117,10 +121,8 @@ pub fn diagnose(
     let flaws = flaws_of(diagnosis)?;
     let prepared = Prepared::new(diagnosis, &flaws)?;
     let Prepared { scene, motion, gross, .. } = &prepared;
-    let noise = NoiseModel {
-        odometry: diagnosis.options.odometry_noise,
-        inertial: diagnosis.inertial.is_some(),
-    };
+    let noise =
+        NoiseModel { odometry: diagnosis.options.odometry_noise, inertial: diagnosis.inertial.is_some() };
     let mut work = Work::new(scene, motion, noise, &Theta::zero())?;
     let found = search(&mut work, &flaws, progress)?;
     Ok(report::diagnosed(diagnosis, &prepared, &work, &found, gross))
@@ -138,6 +140,8 @@ pub(self) struct Gross {
 pub(self) struct Prepared<'a> {
     scene: Scene<'a>,
     motion: Motion<'a>,
+    /// The same poses as they are read, not smoothed.
+    plain: Motion<'a>,
     gross: Gross,
     rmse_px: f64,
     scored: usize,
@@ -153,16 +157,10 @@ impl<'a> Prepared<'a> {
         let trajectory = &evaluation.streams[stream].trajectory;
         let mut scene = Scene::new(evaluation, stream, depth)?;
         // Labels outside of the stream, or in its gaps, are no matter of a convention.
-        let posed: Vec<bool> = scene
-            .frames
-            .iter()
-            .map(|f| trajectory.pose_at(f.stamp, evaluation.max_gap).is_ok())
-            .collect();
-        let keep: Vec<bool> = scene
-            .labels
-            .iter()
-            .map(|l| posed[l.frame] && posed[scene.segments[l.segment].frame])
-            .collect();
+        let posed: Vec<bool> =
+            scene.frames.iter().map(|f| trajectory.pose_at(f.stamp, evaluation.max_gap).is_ok()).collect();
+        let keep: Vec<bool> =
+            scene.labels.iter().map(|l| posed[l.frame] && posed[scene.segments[l.segment].frame]).collect();
         scene.only(&keep);
         if scene.labels.is_empty() {
             return Err(DiagnoseError::NothingScored);
@@ -173,11 +171,12 @@ impl<'a> Prepared<'a> {
             Some(_) => (as_read, Gross { conventions: vec![], frozen: false, likelier: 0.0 }),
             None => conventions(diagnosis, &scene, as_read, flaws)?,
         };
+        let plain = motion;
         let motion = match inertial {
-            Some(_) => motion,
-            None => Motion { poses: motion.poses.smoothed(), id: 2_000, ..motion },
+            Some(_) => plain.clone(),
+            None => Motion { poses: plain.poses.smoothed(), id: 2_000, ..plain.clone() },
         };
-        Ok(Self { scene, motion, gross, rmse_px, scored })
+        Ok(Self { scene, motion, plain, gross, rmse_px, scored })
     }
 }
 
@@ -208,11 +207,7 @@ fn conventions<'a>(
 }
 
 /// The least robust cost that any flaw alone leaves of the poses as they were read.
-fn best_flaw_cost<'a>(
-    scene: &Scene<'a>,
-    motion: &Motion<'a>,
-    flaws: &[Flaw],
-) -> Result<f64, DiagnoseError> {
+fn best_flaw_cost<'a>(scene: &Scene<'a>, motion: &Motion<'a>, flaws: &[Flaw]) -> Result<f64, DiagnoseError> {
     // Far from the answer the poses' noise says little: a wide one lets each flaw do what it can.
     let noise = NoiseModel { odometry: OdometryNoise::WHEEL, inertial: false };
     let work = Work::new(scene, motion, noise, &Theta::zero())?;

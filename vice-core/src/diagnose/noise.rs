@@ -77,7 +77,9 @@ impl FromStr for OdometryNoise {
             _ => {}
         }
         let wrong = || {
-            format!("`{text}` is no odometry noise: expected wheel, vio, mocap or as 4mm,0.05deg (a root second)")
+            format!(
+                "`{text}` is no odometry noise: expected wheel, vio, mocap or as 4mm,0.05deg (a root second)"
+            )
         };
         let (position, yaw) = text.split_once(',').ok_or_else(wrong)?;
         let number = |text: &str, units: [(&str, f64); 3]| -> Option<f64> {
@@ -162,7 +164,11 @@ impl NoiseModel {
 
     /// Which sizes are estimated.
     pub(super) fn free(&self) -> &'static [usize] {
-        if self.inertial { &[WHITE, WALK, POSITION, YAW] } else { &[WHITE, WALK, POSITION, YAW, LEAN, JITTER] }
+        if self.inertial {
+            &[WHITE, WALK, POSITION, YAW]
+        } else {
+            &[WHITE, WALK, POSITION, YAW, LEAN, JITTER]
+        }
     }
 
     /// How likely sizes are before anything is seen, as a logarithm without its constant.

@@ -1,7 +1,8 @@
 //! From hypotheses to the document.
 
 use super::document::{
-    DiagnosisDocument, Estimated, FlawPart, HypothesisPart, LabelsPart, OdometryPart, Overlap, SCHEMA, Verdict, VerdictKind,
+    DiagnosisDocument, Estimated, FlawPart, HypothesisPart, LabelsPart, OdometryPart, Overlap, SCHEMA,
+    Verdict, VerdictKind,
 };
 use super::fit::{Fit, Work};
 use super::flaw::{Flaw, PARAMETERS};
@@ -36,13 +37,11 @@ pub(super) fn diagnosed(
     let none = search.ranked.iter().find(|r| r.fit.flaws.is_empty());
     let taken_px = none.map_or(prepared.rmse_px, |r| work.rms(&r.fit.residuals));
     let decision = decide(search, &work.noise, taken_px, labels_rmse_px);
-    let reporter = Reporter { work, search, labels_rmse_px, rmse_px: prepared.rmse_px };
+    let reporter = Reporter { work, prepared, search, labels_rmse_px, rmse_px: prepared.rmse_px };
     let (verdict, theta) =
         reporter.verdict(&decision, gross, evaluation.settings.time_offset_s, diagnosis.inertial.is_some());
-    let singles: Vec<&Ranked> = Flaw::ALL
-        .iter()
-        .filter_map(|f| search.ranked.iter().find(|r| r.fit.flaws == [*f]))
-        .collect();
+    let singles: Vec<&Ranked> =
+        Flaw::ALL.iter().filter_map(|f| search.ranked.iter().find(|r| r.fit.flaws == [*f])).collect();
     let document = DiagnosisDocument {
         schema: SCHEMA.to_string(),
         vice_version: env!("CARGO_PKG_VERSION").to_string(),
@@ -102,8 +101,7 @@ fn labels_rmse_px(work: &Work<'_, '_>, best: &Fit) -> f64 {
         count += 1;
         let key = &work.geometry.segments[label.segment].by_pixel;
         let answer = &work.geometry.labels[i];
-        let moved: f64 =
-            answer.by_place.iter().map(|h| (h.transpose() * key).norm_squared()).sum();
+        let moved: f64 = answer.by_place.iter().map(|h| (h.transpose() * key).norm_squared()).sum();
         let age_s = work.scene.frames[label.frame].t_s
             - work.scene.frames[work.scene.segments[label.segment].frame].t_s;
         let expected = 2.0 * white + white * moved + 2.0 * sizes.walk_px.powi(2) * age_s;
@@ -139,12 +137,21 @@ fn odometry(work: &Work<'_, '_>, best: &Fit) -> OdometryPart {
 
 struct Reporter<'r, 's, 'a> {
     work: &'r Work<'s, 'a>,
+    prepared: &'r Prepared<'a>,
     search: &'r Search,
     labels_rmse_px: f64,
     rmse_px: f64,
 }
 
 impl Reporter<'_, '_, '_> {
+    /// RMSE_2D with the values of a fit taken out, the poses as they are read: what an evaluation then gives.
+    fn left_px(&self, fit: &Fit) -> f64 {
+        let residuals = self.prepared.scene.residuals(&fit.values(), &self.prepared.plain);
+        let Ok(residuals) = residuals else { return self.work.rms(&fit.residuals_now()) };
+        let scored: Vec<f64> = residuals.iter().flatten().map(|r| r.norm_squared()).collect();
+        (scored.iter().sum::<f64>() / scored.len().max(1) as f64).sqrt()
+    }
+
     fn hypotheses(&self) -> Vec<HypothesisPart> {
         let none = self.search.ranked.iter().find(|r| r.fit.flaws.is_empty());
         let at_best = |fit: &Fit| fit.score - fit.solution.evidence + fit.solution.likelihood;
@@ -167,16 +174,22 @@ impl Reporter<'_, '_, '_> {
     fn part(&self, fit: &Fit, flaw: Flaw) -> FlawPart {
         let values = fit.values();
         let deviation = |parameter: usize| {
-            fit.parameters.iter().position(|p| *p == parameter).map_or(0.0, |i| {
-                fit.solution.covariance[(i, i)].max(0.0).sqrt()
-            })
+            fit.parameters
+                .iter()
+                .position(|p| *p == parameter)
+                .map_or(0.0, |i| fit.solution.covariance[(i, i)].max(0.0).sqrt())
         };
         let parameters: Vec<Estimated> = flaw
             .parameters()
             .map(|p| {
                 let half = HALF_WIDTH * deviation(p);
                 let value = values[p];
-                Estimated { name: PARAMETERS[p].name.to_string(), value, low: value - half, high: value + half }
+                Estimated {
+                    name: PARAMETERS[p].name.to_string(),
+                    value,
+                    low: value - half,
+                    high: value + half,
+                }
             })
             .collect();
         // The yaw rate of a drift is of another unit than its velocity.
@@ -201,7 +214,7 @@ impl Reporter<'_, '_, '_> {
             Estimated { name, value: length, low: (length - half).max(0.0), high: length + half }
         });
         let none = self.search.ranked.iter().find(|r| r.fit.flaws.is_empty());
-        let rmse_px = self.work.rms(&fit.residuals_now());
+        let rmse_px = self.left_px(fit);
         let before = none.map_or(self.rmse_px, |r| self.work.rms(&r.fit.residuals));
         let effects: Vec<f64> = flaw
             .solved()
@@ -237,7 +250,7 @@ impl Reporter<'_, '_, '_> {
         let best = &self.search.ranked[0];
         let none = share(self.search, &[]);
         let sets = share(self.search, &best.fit.flaws);
-        let left_px = self.work.rms(&best.fit.residuals_now());
+        let left_px = self.left_px(&best.fit);
         let base = Verdict {
             kind: VerdictKind::NoFlaw,
             flaws: vec![],
@@ -284,7 +297,7 @@ impl Reporter<'_, '_, '_> {
         match decision {
             Decision::NoFlaw => {
                 let sentence = format!(
-                    "no flaw found: the {:.2} px are the labels' noise ({:.2} px) and an odometry that wanders as it may ({noise})",
+                    "no flaw found above the label noise ({:.2} px, of which the labels alone make {:.2} px) and what an odometry may wander ({noise})",
                     self.rmse_px, self.labels_rmse_px
                 );
                 (Verdict { sentence, ..base }, Theta::zero())
@@ -416,11 +429,10 @@ impl Reporter<'_, '_, '_> {
         named: impl Fn(&Fit) -> (Vec<FlawPart>, Vec<String>),
     ) -> (Verdict, Theta) {
         let best = &self.search.ranked[0];
-        let left_px = self.work.rms(&best.fit.residuals_now());
+        let left_px = self.left_px(&best.fit);
         let words: Vec<String> = gross.conventions.iter().map(|c| c.words()).collect();
         let list = crate::conventions::list_text(&gross.conventions);
-        let mut flaws: Vec<String> =
-            gross.conventions.iter().map(|c| c.verdict_name().to_string()).collect();
+        let mut flaws: Vec<String> = gross.conventions.iter().map(|c| c.verdict_name().to_string()).collect();
         let beside = *decision == Decision::Named
             && share(self.search, &best.fit.flaws) > SURE_BESIDE
             && share(self.search, &[]) < 0.02;
@@ -432,7 +444,7 @@ impl Reporter<'_, '_, '_> {
             flaws.extend(best.fit.flaws.iter().map(|f| f.name().to_string()));
         }
         let none = self.search.ranked.iter().find(|r| r.fit.flaws.is_empty());
-        let cured_px = if beside { left_px } else { none.map_or(left_px, |r| self.work.rms(&r.fit.residuals)) };
+        let cured_px = if beside { left_px } else { none.map_or(left_px, |r| self.left_px(&r.fit)) };
         let sentence = format!(
             "most likely {}{also}: {:.2} px become {cured_px:.2} px with --estimate-as {list}",
             words.join(", and "),

@@ -79,7 +79,11 @@ pub(super) struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    pub(super) fn new(evaluation: &'a Evaluation<'a>, stream: usize, depth: usize) -> Result<Self, DiagnoseError> {
+    pub(super) fn new(
+        evaluation: &'a Evaluation<'a>,
+        stream: usize,
+        depth: usize,
+    ) -> Result<Self, DiagnoseError> {
         let first_frame = evaluation.frames.first().copied().ok_or(EvaluateError::NoFrames)?;
         let trial = Trial::new(evaluation);
         let cameras = trial.cameras().map_err(EvaluateError::Data)?;
@@ -116,8 +120,7 @@ impl<'a> Scene<'a> {
             }
         }
         let anchor = &evaluation.streams[evaluation.anchor].trajectory;
-        let anchored =
-            frames.iter().map(|f| anchor.pose_at(f.stamp, evaluation.max_gap).is_ok()).collect();
+        let anchored = frames.iter().map(|f| anchor.pose_at(f.stamp, evaluation.max_gap).is_ok()).collect();
         let source = evaluation.depths[depth];
         let mut scene = Self {
             camera: evaluation.camera,
@@ -179,12 +182,20 @@ impl<'a> Scene<'a> {
     }
 
     /// Residuals with the flaws taken out; `None` where a label cannot be carried.
-    pub(super) fn residuals(&self, theta: &Theta, motion: &Motion<'_>) -> Result<Vec<Option<Residual>>, DiagnoseError> {
+    pub(super) fn residuals(
+        &self,
+        theta: &Theta,
+        motion: &Motion<'_>,
+    ) -> Result<Vec<Option<Residual>>, DiagnoseError> {
         let view = self.view(theta, motion)?;
         Ok(self.labels.iter().map(|l| view.residual(l)).collect())
     }
 
-    pub(super) fn view<'s>(&'s self, theta: &Theta, motion: &'s Motion<'_>) -> Result<View<'s, 'a>, DiagnoseError> {
+    pub(super) fn view<'s>(
+        &'s self,
+        theta: &Theta,
+        motion: &'s Motion<'_>,
+    ) -> Result<View<'s, 'a>, DiagnoseError> {
         let refused = |why: String| DiagnoseError::CannotEvaluate(why);
         let camera = theta.correct_camera(self.camera).map_err(|e| refused(e.to_string()))?;
         let reader = motion.reader(theta).map_err(|e| refused(e.to_string()))?;
@@ -208,7 +219,12 @@ impl<'a> Scene<'a> {
     }
 
     /// Depths of the segments' key points.
-    fn depths(&self, theta: &Theta, reader: &Reader<'_>, motion: &Motion<'_>) -> Result<Arc<Vec<Option<f64>>>, DiagnoseError> {
+    fn depths(
+        &self,
+        theta: &Theta,
+        reader: &Reader<'_>,
+        motion: &Motion<'_>,
+    ) -> Result<Arc<Vec<Option<f64>>>, DiagnoseError> {
         let mut key = Vec::new();
         let camera_moves = |f: &Flaw| f.of_the_camera() || *f == Flaw::RollingShutter || self.own_anchor;
         if !self.fixed_depth {
@@ -235,9 +251,8 @@ impl<'a> Scene<'a> {
 
     /// Asks the source, for the first key frames at most.
     fn ask(&self, theta: &Theta, own: &Reader<'_>, most: usize) -> Result<Vec<Option<f64>>, DiagnoseError> {
-        let camera = theta
-            .correct_camera(self.camera)
-            .map_err(|e| DiagnoseError::CannotEvaluate(e.to_string()))?;
+        let camera =
+            theta.correct_camera(self.camera).map_err(|e| DiagnoseError::CannotEvaluate(e.to_string()))?;
         let readout_s = theta.of(Flaw::RollingShutter)[0];
         let mut by_frame: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         for (i, segment) in self.segments.iter().enumerate() {
@@ -248,39 +263,42 @@ impl<'a> Scene<'a> {
             None => None,
         };
         let reader = anchor.as_ref().unwrap_or(own);
-        let one = |(frame, segments): (&usize, &Vec<usize>)| -> Result<Vec<(usize, Option<f64>)>, DiagnoseError> {
-            let at = &self.frames[*frame];
-            let (Some(body_from_camera), Some(floor)) = (at.body_from_camera, at.floor) else {
-                return Ok(vec![]);
-            };
-            let body_from_camera = theta.correct_extrinsics(&body_from_camera);
-            let asked = |t_s: f64, pixels: &[Pixel]| {
-                let pose = self.anchored[*frame].then(|| reader.at(t_s) * body_from_camera);
-                let keyframe = Keyframe {
-                    stamp: at.stamp,
-                    frame: at.index,
-                    camera: &camera,
-                    body_from_camera,
-                    world_from_camera: pose,
-                    floor,
+        let one =
+            |(frame, segments): (&usize, &Vec<usize>)| -> Result<Vec<(usize, Option<f64>)>, DiagnoseError> {
+                let at = &self.frames[*frame];
+                let (Some(body_from_camera), Some(floor)) = (at.body_from_camera, at.floor) else {
+                    return Ok(vec![]);
                 };
-                self.source.depths(&keyframe, pixels).map_err(EvaluateError::Data)
-            };
-            let mut found = Vec::new();
-            if readout_s == 0.0 {
-                let pixels: Vec<Pixel> = segments.iter().map(|s| self.segments[*s].px).collect();
-                let depths = asked(at.t_s, &pixels)?;
-                found.extend(segments.iter().copied().zip(depths.iter().map(|d| d.as_ref().ok().map(|d| d.z_m))));
-            } else {
-                for s in segments {
-                    let px = self.segments[*s].px;
-                    let depths = asked(at.t_s + readout_s * row_share(&camera, px), &[px])?;
-                    let depth = depths.first().and_then(|d| d.as_ref().ok()).map(|d| d.z_m);
-                    found.push((*s, depth));
+                let body_from_camera = theta.correct_extrinsics(&body_from_camera);
+                let asked = |t_s: f64, pixels: &[Pixel]| {
+                    let pose = self.anchored[*frame].then(|| reader.at(t_s) * body_from_camera);
+                    let keyframe = Keyframe {
+                        stamp: at.stamp,
+                        frame: at.index,
+                        camera: &camera,
+                        body_from_camera,
+                        world_from_camera: pose,
+                        floor,
+                    };
+                    self.source.depths(&keyframe, pixels).map_err(EvaluateError::Data)
+                };
+                let mut found = Vec::new();
+                if readout_s == 0.0 {
+                    let pixels: Vec<Pixel> = segments.iter().map(|s| self.segments[*s].px).collect();
+                    let depths = asked(at.t_s, &pixels)?;
+                    found.extend(
+                        segments.iter().copied().zip(depths.iter().map(|d| d.as_ref().ok().map(|d| d.z_m))),
+                    );
+                } else {
+                    for s in segments {
+                        let px = self.segments[*s].px;
+                        let depths = asked(at.t_s + readout_s * row_share(&camera, px), &[px])?;
+                        let depth = depths.first().and_then(|d| d.as_ref().ok()).map(|d| d.z_m);
+                        found.push((*s, depth));
+                    }
                 }
-            }
-            Ok(found)
-        };
+                Ok(found)
+            };
         let answers: Vec<_> = if self.roughness > 0.0 {
             by_frame.par_iter().map(one).collect::<Result<_, _>>()?
         } else {

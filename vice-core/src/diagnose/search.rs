@@ -4,9 +4,9 @@ use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::filter::Weights;
-use super::gross::independent;
 use super::fit::{Fit, Normal, Work, expected_of, parameters_of};
 use super::flaw::Flaw;
+use super::gross::independent;
 use super::noise::Logs;
 use super::outliers;
 use super::starts::{robust_cost, start};
@@ -153,9 +153,8 @@ fn singles(
 
 /// The fit that leaves least by a robust measure; no flaw unless one is clearly better, one flaw unless two are.
 fn nearest(fits: &[Fit], labels: usize) -> &Fit {
-    let cost = |fit: &Fit| {
-        robust_cost(&fit.residuals_now()) * independent(labels) + NEARER * fit.flaws.len() as f64
-    };
+    let cost =
+        |fit: &Fit| robust_cost(&fit.residuals_now()) * independent(labels) + NEARER * fit.flaws.len() as f64;
     let mut best = &fits[0];
     for fit in fits {
         if cost(fit) < cost(best) {
@@ -248,7 +247,9 @@ fn pairs(work: &Work<'_, '_>, fits: &[Fit], flaws: &[Flaw], most_pairs: usize, i
         .take(3)
         .collect::<Vec<_>>()
         .into_par_iter()
-        .flat_map(|i| second_flaws(work, &fits[i], flaws).into_iter().map(|(s, set)| (s, set, i)).collect::<Vec<_>>())
+        .flat_map(|i| {
+            second_flaws(work, &fits[i], flaws).into_iter().map(|(s, set)| (s, set, i)).collect::<Vec<_>>()
+        })
         .collect();
     let mut looked = looked;
     looked.sort_by(|a, b| b.0.total_cmp(&a.0));

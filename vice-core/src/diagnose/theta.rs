@@ -71,9 +71,7 @@ impl Theta {
             Model::Rational(m) => {
                 Model::Rational(Rational { k1: m.k1 - k1, k2: m.k2 - k2, p1: m.p1 - p1, p2: m.p2 - p2, ..m })
             }
-            Model::Equidistant(m) => {
-                Model::Equidistant(Equidistant { k1: m.k1 - k1, k2: m.k2 - k2, ..m })
-            }
+            Model::Equidistant(m) => Model::Equidistant(Equidistant { k1: m.k1 - k1, k2: m.k2 - k2, ..m }),
         }
     }
 

@@ -29,9 +29,14 @@ pub(super) enum Decision {
     Named,
     CannotTell(Vec<Flaw>),
     /// Noise or jumps, if that is what it looks like.
-    Unexplained { noise: bool, jumps: bool },
+    Unexplained {
+        noise: bool,
+        jumps: bool,
+    },
     /// How many times as many labels would be needed.
-    TooFew { times: f64 },
+    TooFew {
+        times: f64,
+    },
 }
 
 /// Whether the odometry wanders more than is healthy, or jumps.
@@ -42,7 +47,8 @@ pub(super) fn sick(fit: &Fit, noise: &NoiseModel) -> (bool, bool) {
 
 /// Share of all hypotheses with exactly these flaws.
 pub(super) fn share(search: &Search, flaws: &[Flaw]) -> f64 {
-    let same = |r: &&Ranked| r.fit.flaws.len() == flaws.len() && flaws.iter().all(|f| r.fit.flaws.contains(f));
+    let same =
+        |r: &&Ranked| r.fit.flaws.len() == flaws.len() && flaws.iter().all(|f| r.fit.flaws.contains(f));
     search.ranked.iter().filter(same).map(|r| r.posterior).sum()
 }
 
@@ -87,10 +93,12 @@ pub(super) fn decide(search: &Search, noise: &NoiseModel, rmse_px: f64, labels_r
             break;
         }
         held += ranked.posterior;
-        candidates.extend(ranked.fit.flaws.iter().filter(|f| !candidates.contains(f)).copied().collect::<Vec<_>>());
+        candidates
+            .extend(ranked.fit.flaws.iter().filter(|f| !candidates.contains(f)).copied().collect::<Vec<_>>());
     }
     for rival in rivals {
-        candidates.extend(rival.flaws.iter().filter(|f| !candidates.contains(f)).copied().collect::<Vec<_>>());
+        candidates
+            .extend(rival.flaws.iter().filter(|f| !candidates.contains(f)).copied().collect::<Vec<_>>());
     }
     Decision::CannotTell(candidates)
 }

@@ -93,10 +93,9 @@ pub(super) fn correction(flaw: Flaw, values: &[f64], time_offset_s: f64) -> Stri
         ),
         Flaw::Distortion => format!("add [{}] to k1, k2, p1, p2", all(1.0)),
         Flaw::Aspect => format!("multiply fx by {:.6}", 1.0 / (1.0 + values[0])),
-        Flaw::ClockRate => format!(
-            "divide the estimate's times since the camera's first frame by {:.9}",
-            1.0 + values[0]
-        ),
+        Flaw::ClockRate => {
+            format!("divide the estimate's times since the camera's first frame by {:.9}", 1.0 + values[0])
+        }
         Flaw::ClockStep => format!(
             "take {:.6} s off the estimate's stamps from {:.3} s after the camera's first frame on",
             values[0], values[1]
