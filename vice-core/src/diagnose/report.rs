@@ -15,6 +15,8 @@ use super::{Diagnosed, Diagnosis, Gross, Prepared, words};
 /// Half the width of a 95 % interval in posterior deviations: the sizes of the noise are estimated, and the model is no
 /// truth.
 const HALF_WIDTH: f64 = 2.5;
+/// The sensors of an integration are one draw of noise, whose sizes ten seconds hardly show.
+const HALF_WIDTH_TILT: f64 = 3.5;
 /// So many hypotheses are listed.
 const MOST_HYPOTHESES: usize = 8;
 /// An overlap that is worth a word.
@@ -104,7 +106,10 @@ fn labels_rmse_px(work: &Work<'_, '_>, best: &Fit) -> f64 {
         let moved: f64 = answer.by_place.iter().map(|h| (h.transpose() * key).norm_squared()).sum();
         let age_s = work.scene.frames[label.frame].t_s
             - work.scene.frames[work.scene.segments[label.segment].frame].t_s;
-        let expected = 2.0 * white + white * moved + 2.0 * sizes.walk_px.powi(2) * age_s;
+        // The depth's own noise is none of the poses'.
+        let depth = &work.geometry.segments[label.segment].depth_variance;
+        let depth: f64 = answer.by_place.iter().map(|h| (h.transpose() * depth * h)[0]).sum();
+        let expected = 2.0 * white + white * moved + 2.0 * sizes.walk_px.powi(2) * age_s + depth;
         let aside = work.weights.labels[i] > 1.0 || work.weights.keys[label.segment] > 1.0;
         sum += if aside { residuals[i].norm_squared().max(expected) } else { expected };
     }
@@ -135,6 +140,10 @@ fn odometry(work: &Work<'_, '_>, best: &Fit) -> OdometryPart {
     }
 }
 
+fn half_width(flaw: Flaw) -> f64 {
+    if flaw == Flaw::InitialTilt { HALF_WIDTH_TILT } else { HALF_WIDTH }
+}
+
 struct Reporter<'r, 's, 'a> {
     work: &'r Work<'s, 'a>,
     prepared: &'r Prepared<'a>,
@@ -144,6 +153,12 @@ struct Reporter<'r, 's, 'a> {
 }
 
 impl Reporter<'_, '_, '_> {
+    /// Share of all hypotheses that hold all of these flaws.
+    fn with_all(&self, flaws: &[Flaw]) -> f64 {
+        let holds = |r: &&Ranked| flaws.iter().all(|f| r.fit.flaws.contains(f));
+        self.search.ranked.iter().filter(holds).map(|r| r.posterior).sum::<f64>().min(1.0)
+    }
+
     /// RMSE_2D with the values of a fit taken out, the poses as they are read: what an evaluation then gives.
     fn left_px(&self, fit: &Fit) -> f64 {
         let residuals = self.prepared.scene.residuals(&fit.values(), &self.prepared.plain);
@@ -182,7 +197,7 @@ impl Reporter<'_, '_, '_> {
         let parameters: Vec<Estimated> = flaw
             .parameters()
             .map(|p| {
-                let half = HALF_WIDTH * deviation(p);
+                let half = half_width(flaw) * deviation(p);
                 let value = values[p];
                 Estimated {
                     name: PARAMETERS[p].name.to_string(),
@@ -209,7 +224,7 @@ impl Reporter<'_, '_, '_> {
                     variance += x[a] * x[b] * fit.solution.covariance[(at(a), at(b))];
                 }
             }
-            let half = HALF_WIDTH * variance.max(0.0).sqrt() / length.max(1e-12);
+            let half = half_width(flaw) * variance.max(0.0).sqrt() / length.max(1e-12);
             let name = PARAMETERS[first].name.replacen("_x", "", 1);
             Estimated { name, value: length, low: (length - half).max(0.0), high: length + half }
         });
@@ -302,8 +317,10 @@ impl Reporter<'_, '_, '_> {
                 );
                 (Verdict { sentence, ..base }, Theta::zero())
             }
-            Decision::Named => {
-                let (fitted, corrections) = named(&best.fit);
+            Decision::Named(flaws) => {
+                let fit = &self.search.ranked.iter().find(|r| r.fit.flaws == *flaws).unwrap_or(best).fit;
+                let left_px = self.left_px(fit);
+                let (fitted, corrections) = named(fit);
                 let values: Vec<&str> = fitted.iter().map(|f| f.text.as_str()).collect();
                 let sentence = format!(
                     "most likely {}: {:.2} px become {left_px:.2} px without it",
@@ -312,15 +329,16 @@ impl Reporter<'_, '_, '_> {
                 );
                 let verdict = Verdict {
                     kind: VerdictKind::Named,
-                    flaws: best.fit.flaws.iter().map(name).collect(),
-                    sureness: sets,
+                    flaws: flaws.iter().map(name).collect(),
+                    sureness: self.with_all(flaws),
                     fitted,
                     rmse_px: left_px,
                     sentence,
                     corrections,
                     ..base
                 };
-                (verdict, best.fit.values())
+                let values = fit.values();
+                (verdict, values)
             }
             Decision::CannotTell(candidates) => {
                 let listed: Vec<String> = candidates.iter().map(|f| f.words().to_string()).collect();
@@ -360,7 +378,7 @@ impl Reporter<'_, '_, '_> {
                         .collect();
                     why.push_str(&format!("; it jumps or slides at {}", at.join(", ")));
                 }
-                let is_noise = inertial && best.fit.flaws.is_empty() && *wanders;
+                let is_noise = inertial && best.fit.flaws.is_empty() && !*jumps;
                 let kind = if is_noise { VerdictKind::Named } else { VerdictKind::Unexplained };
                 let sentence = if is_noise {
                     format!(
@@ -429,22 +447,26 @@ impl Reporter<'_, '_, '_> {
         named: impl Fn(&Fit) -> (Vec<FlawPart>, Vec<String>),
     ) -> (Verdict, Theta) {
         let best = &self.search.ranked[0];
-        let left_px = self.left_px(&best.fit);
         let words: Vec<String> = gross.conventions.iter().map(|c| c.words()).collect();
         let list = crate::conventions::list_text(&gross.conventions);
         let mut flaws: Vec<String> = gross.conventions.iter().map(|c| c.verdict_name().to_string()).collect();
-        let beside = *decision == Decision::Named
-            && share(self.search, &best.fit.flaws) > SURE_BESIDE
+        let fit = match decision {
+            Decision::Named(flaws) => self.search.ranked.iter().find(|r| r.fit.flaws == *flaws),
+            _ => None,
+        };
+        let fit = fit.map_or(&best.fit, |r| &r.fit);
+        let beside = matches!(decision, Decision::Named(_))
+            && self.with_all(&fit.flaws) > SURE_BESIDE
             && share(self.search, &[]) < 0.02;
-        let (fitted, mut corrections) = if beside { named(&best.fit) } else { (vec![], vec![]) };
+        let (fitted, mut corrections) = if beside { named(fit) } else { (vec![], vec![]) };
         let values: Vec<&str> = fitted.iter().map(|f| f.text.as_str()).collect();
         let also = if beside { format!(", and {}", values.join("; ")) } else { String::new() };
         corrections.insert(0, format!("--estimate-as {list}"));
         if beside {
-            flaws.extend(best.fit.flaws.iter().map(|f| f.name().to_string()));
+            flaws.extend(fit.flaws.iter().map(|f| f.name().to_string()));
         }
         let none = self.search.ranked.iter().find(|r| r.fit.flaws.is_empty());
-        let cured_px = if beside { left_px } else { none.map_or(left_px, |r| self.left_px(&r.fit)) };
+        let cured_px = self.left_px(if beside { fit } else { none.map_or(fit, |r| &r.fit) });
         let sentence = format!(
             "most likely {}{also}: {:.2} px become {cured_px:.2} px with --estimate-as {list}",
             words.join(", and "),
@@ -461,7 +483,7 @@ impl Reporter<'_, '_, '_> {
             estimate_as: gross.conventions.iter().map(ToString::to_string).collect(),
             ..base
         };
-        (verdict, if beside { best.fit.values() } else { Theta::zero() })
+        (verdict, if beside { fit.values() } else { Theta::zero() })
     }
 }
 

@@ -175,10 +175,10 @@ impl<'a> Scene<'a> {
             .with(Flaw::ExtrinsicTranslation, &[0.01, 0.01, 0.01])
             .with(Flaw::FocalLength, &[2e-3]);
         let moved = depths(&moved)?;
-        Ok(as_is.iter().zip(&moved).all(|(a, b)| match (a, b) {
-            (Some(a), Some(b)) => (a - b).abs() <= 1e-9 * a.abs(),
-            _ => true,
-        }))
+        // Where nothing has depth (poses of another convention look at the sky) nothing is known: it is asked again.
+        let both: Vec<(f64, f64)> =
+            as_is.iter().zip(&moved).filter_map(|(a, b)| Some(((*a)?, (*b)?))).collect();
+        Ok(!both.is_empty() && both.iter().all(|(a, b)| (a - b).abs() <= 1e-9 * a.abs()))
     }
 
     /// Residuals with the flaws taken out; `None` where a label cannot be carried.

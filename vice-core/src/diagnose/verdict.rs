@@ -9,6 +9,10 @@ use super::search::{Ranked, Search};
 const SURE: f64 = 0.88;
 /// ... and no other with as many flaws whose best fit is as good but for this, as a logarithm.
 const RIVAL: f64 = 2.5;
+/// ... or, of one flaw, all hypotheses that hold it this one.
+const SURE_WITH: f64 = 0.97;
+/// A second flaw must add this, as a logarithm.
+const SECOND: f64 = 20.0;
 /// No flaw is said where it has this share of the hypotheses.
 const NONE: f64 = 0.3;
 /// Beyond these times the expected walk an odometry is not healthy.
@@ -26,7 +30,7 @@ const SHOWN: f64 = 0.5;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Decision {
     NoFlaw,
-    Named,
+    Named(Vec<Flaw>),
     CannotTell(Vec<Flaw>),
     /// Noise or jumps, if that is what it looks like.
     Unexplained {
@@ -72,17 +76,16 @@ pub(super) fn decide(search: &Search, noise: &NoiseModel, rmse_px: f64, labels_r
         let high = rmse_px > ABOVE_LABELS * labels_rmse_px;
         return match is_sick || high {
             false => Decision::NoFlaw,
-            true => Decision::Unexplained { noise: !jumps || wanders, jumps },
+            true => Decision::Unexplained { noise: wanders, jumps },
         };
     }
     if is_sick {
-        return Decision::Unexplained { noise: !jumps || wanders, jumps };
+        return Decision::Unexplained { noise: wanders, jumps };
     }
-    let set = &best.fit.flaws;
-    let rivals = rivals(search);
-    if share(search, set) >= SURE && rivals.is_empty() && set.len() <= 2 && plausible(&best.fit) {
-        return Decision::Named;
+    if let Some(core) = core(search) {
+        return Decision::Named(core);
     }
+    let rivals = rivals(search, &best.fit);
     if !plausible(&best.fit) {
         return Decision::Unexplained { noise: false, jumps: false };
     }
@@ -103,21 +106,49 @@ pub(super) fn decide(search: &Search, noise: &NoiseModel, rmse_px: f64, labels_r
     Decision::CannotTell(candidates)
 }
 
+/// The flaws that are named: the best hypothesis, or without a second flaw that adds little to it. A small gain may ride on
+/// an outlier that nobody found, so that it makes no name; it is no doubt of the first one either.
+fn core(search: &Search) -> Option<Vec<Flaw>> {
+    let best = &search.ranked[0].fit;
+    let mut core = best;
+    if best.flaws.len() == 2 {
+        let single = search
+            .ranked
+            .iter()
+            .map(|r| &r.fit)
+            .filter(|f| f.flaws.len() == 1 && best.flaws.contains(&f.flaws[0]))
+            .max_by(|a, b| a.score.total_cmp(&b.score))?;
+        if best.score - single.score < SECOND {
+            core = single;
+        }
+    }
+    let with: f64 = search
+        .ranked
+        .iter()
+        .filter(|r| core.flaws.iter().all(|f| r.fit.flaws.contains(f)))
+        .map(|r| r.posterior)
+        .sum();
+    let alone = share(search, &core.flaws);
+    let sure = alone >= SURE || (core.flaws.len() == 1 && with >= SURE_WITH);
+    let without_it = |fit: &&Fit| core.flaws.iter().any(|f| !fit.flaws.contains(f));
+    let unrivalled =
+        rivals(search, core).is_empty() && !rivals(search, best).iter().any(without_it);
+    (sure && unrivalled && plausible(core)).then(|| core.flaws.clone())
+}
+
 /// Others with as many flaws or fewer that fit as well at their best: evidence alone prefers fewer parameters, which is no
 /// evidence.
-fn rivals(search: &Search) -> Vec<&Fit> {
-    let best = &search.ranked[0].fit;
+fn rivals<'s>(search: &'s Search, of: &Fit) -> Vec<&'s Fit> {
     let fits_at_best = |fit: &Fit| fit.score - fit.solution.evidence + fit.solution.likelihood;
-    let limit = fits_at_best(best) - RIVAL;
+    let limit = fits_at_best(of) - RIVAL;
     search
         .ranked
         .iter()
-        .skip(1)
         .map(|r| &r.fit)
         .filter(|fit| {
             !fit.flaws.is_empty()
-                && fit.flaws.len() <= best.flaws.len()
-                && !fit.flaws.iter().all(|f| best.flaws.contains(f))
+                && fit.flaws.len() <= of.flaws.len()
+                && !fit.flaws.iter().all(|f| of.flaws.contains(f))
                 && fits_at_best(fit) > limit
         })
         .collect()
