@@ -79,6 +79,11 @@ impl Flawed {
                     let v = direction * 0.05;
                     vec![v.x, v.y, v.z, sign * 0.4_f64.to_radians()]
                 }
+                Flaw::Distortion => vec![sign * 0.04, 0.0, 0.0, 0.0],
+                Flaw::Aspect => vec![sign * 0.02],
+                Flaw::ClockRate => vec![sign * 0.001],
+                Flaw::ClockStep => vec![sign * 0.1, 18.0],
+                Flaw::RollingShutter => vec![0.02],
                 other => panic!("{other} has no size here"),
             };
             truth = truth.with(flaw, &values);
@@ -107,7 +112,7 @@ impl Flawed {
         let hand = Hand::new(!inertial, &mut Rng::new(seed, 74));
         let reference = trajectory(seconds, |t| flight.at(t).world_from_body * hand.at(t));
         let room = Room { camera, body_from_camera, reference };
-        let labels = labels(&room, &frames, &mut Rng::new(seed, 72));
+        let labels = labels(&room, &frames, truth.of(Flaw::RollingShutter)[0], &mut Rng::new(seed, 72));
         let inertial = inertial.then(|| run(&flight, seconds, &truth, &mut Rng::new(seed, 73)));
         let estimate = match &inertial {
             Some(run) => run.integrate(Span::ZERO, Vector3::zeros()).expect("it can be integrated"),
@@ -201,8 +206,12 @@ fn add_to_camera(camera: &Camera, truth: &Theta) -> Camera {
     let [fx, fy, cx, cy] = camera.fx_fy_cx_cy();
     let longer = 1.0 + truth.of(Flaw::FocalLength)[0];
     let shift = truth.of(Flaw::PrincipalPoint);
-    let wrong = [fx * longer, fy * longer, cx + shift[0], cy + shift[1]];
-    Camera::new(camera.width(), camera.height(), wrong, *camera.model()).expect("a camera")
+    let wider = 1.0 + truth.of(Flaw::Aspect)[0];
+    let wrong = [fx * longer * wider, fy * longer, cx + shift[0], cy + shift[1]];
+    let mut lens = camera.model().coefficients();
+    lens.iter_mut().zip(truth.of(Flaw::Distortion)).for_each(|(c, off)| *c += off);
+    let lens = Model::from_name(camera.model().name(), &lens).expect("a model");
+    Camera::new(camera.width(), camera.height(), wrong, lens).expect("a camera")
 }
 
 fn add_to_extrinsics(body_from_camera: &BodyFromCamera, negated: &Theta) -> BodyFromCamera {
@@ -233,8 +242,14 @@ impl Hand {
 }
 
 /// Points that are followed from a random pixel until they leave the image or for four seconds.
-fn labels(room: &Room, frames: &[Stamp], rng: &mut Rng) -> LabelSet {
+fn labels(room: &Room, frames: &[Stamp], readout_s: f64, rng: &mut Rng) -> LabelSet {
     let camera = &room.camera;
+    // A row is exposed a share of the read-out time before or after the stamp.
+    let at_row = |i: usize, px: Pixel| {
+        let later =
+            Span::from_secs_f64(readout_s * (px.v / f64::from(camera.height()) - 0.5)).expect("a span");
+        room.world_from_camera(frames[i] + later)
+    };
     let at = |i: usize| room.world_from_camera(frames[i]).expect("the truth covers the frames");
     let mut rows = Vec::new();
     for point in 0..POINTS {
@@ -246,7 +261,13 @@ fn labels(room: &Room, frames: &[Stamp], rng: &mut Rng) -> LabelSet {
                 at(frame).translation() + ray * cast(&at(frame), &ray).expect("inside the room"),
             );
             let last = (frame + (LONGEST_SEGMENT_S * FRAME_HZ) as usize).min(frames.len());
-            let seen = |i: usize| camera.project(&at(i).inverse().transform_point(&p)).ok();
+            let seen = |i: usize| {
+                let mut px = camera.project(&at(i).inverse().transform_point(&p)).ok()?;
+                for _ in 0..if readout_s == 0.0 { 0 } else { 4 } {
+                    px = camera.project(&at_row(i, px)?.inverse().transform_point(&p)).ok()?;
+                }
+                Some(px)
+            };
             let mut end = frame;
             for (i, stamp) in frames.iter().enumerate().take(last).skip(frame) {
                 let Some(true_px) = seen(i) else { break };
@@ -299,7 +320,16 @@ fn odometry(reference: &Trajectory, truth: &Theta, rng: &mut Rng) -> Trajectory 
         let tilted = UnitQuaternion::from_scaled_axis(Vector3::new(sway.x, sway.y, 0.0));
         let jitter = UnitQuaternion::from_scaled_axis(vector(rng, JITTER_RAD));
         let rotation = turn(yaw) * tilted * pose.rotation() * jitter;
-        poses.push((stamp + late, Rigid::from_parts(position + vector(rng, JITTER_M), rotation)));
+        let since_s = stamp.since(self::stamp(0.0)).as_secs_f64();
+        let [step_s, step_at_s] = [truth.of(Flaw::ClockStep)[0], truth.of(Flaw::ClockStep)[1]];
+        let step_s = if since_s >= step_at_s { step_s } else { 0.0 };
+        let later = Span::from_secs_f64(truth.of(Flaw::ClockRate)[0] * since_s + step_s).expect("a span");
+        let read = stamp + late + later;
+        let pose = Rigid::from_parts(position + vector(rng, JITTER_M), rotation);
+        // A step back leaves out what it overlaps.
+        if poses.last().is_none_or(|(last, _)| *last < read) {
+            poses.push((read, pose));
+        }
         before = (stamp, pose.translation());
     }
     Trajectory::from_poses(poses).expect("a trajectory")

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 use vice_core::diagnose::{
-    Diagnosed, Diagnosis, DiagnosisDocument, Flaw, Options, SensitivityDocument, Theta, VerdictKind,
-    diagnose, sensitivity,
+    Diagnosed, Diagnosis, DiagnosisDocument, Flaw, OdometryNoise, Options, SensitivityDocument, Theta,
+    VerdictKind, diagnose, sensitivity,
 };
 use vice_core::error::ErrorKind;
 use vice_core::evaluate::Evaluation;
@@ -19,18 +19,22 @@ use crate::request::Request;
 use crate::streams::LoadedStreams;
 
 /// What is looked for, and how.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Looking {
     /// Flaws to look for; empty: all.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub flaws: Vec<Flaw>,
-    /// How.
-    #[serde(default, skip)]
-    pub options: Options,
+    /// How much the odometry may wander and still be healthy.
+    #[serde(default)]
+    pub odometry_noise: OdometryNoise,
 }
 
 impl Looking {
+    fn options(&self) -> Options {
+        Options { odometry_noise: self.odometry_noise }
+    }
+
     /// The flaws to look for.
     pub fn flaws(&self) -> Vec<Flaw> {
         if self.flaws.is_empty() { Flaw::ALL.to_vec() } else { self.flaws.clone() }
@@ -75,7 +79,7 @@ pub fn diagnose_all(
         for stream in estimates(evaluation) {
             for depth in 0..evaluation.depths.len() {
                 let inertial = streams.inertial_run(stream);
-                let options = looking.options;
+                let options = looking.options();
                 let diagnosis = Diagnosis { evaluation, stream, depth, inertial, flaws: &flaws, options };
                 let names =
                     (evaluation.streams[stream].name.clone(), evaluation.depths[depth].name().to_string());
@@ -114,7 +118,7 @@ pub fn sensitivity_of(
             return Err(RunError::usage("estimate", "a sensitivity takes one estimate and one depth source"));
         };
         let inertial = streams.inertial_run(*stream);
-        let options = looking.options;
+        let options = looking.options();
         let diagnosis = Diagnosis { evaluation, stream: *stream, depth: 0, inertial, flaws: &flaws, options };
         Ok(sensitivity(&diagnosis, &|done, total| progress("injecting", done, total))?)
     })
@@ -138,8 +142,17 @@ fn corrected(
     if verdict.kind != VerdictKind::Named {
         return Err(refused(format!("nothing to apply, and nothing is written: {}", verdict.sentence)));
     }
-    let in_no_calibration = [Flaw::InitialTilt, Flaw::Scale, Flaw::Drift];
-    if let Some(flaw) = verdict.flaws.iter().find(|f| in_no_calibration.contains(f)) {
+    let in_a_calibration = [
+        Flaw::ClockOffset,
+        Flaw::ExtrinsicRotation,
+        Flaw::ExtrinsicTranslation,
+        Flaw::FocalLength,
+        Flaw::PrincipalPoint,
+        Flaw::Distortion,
+        Flaw::Aspect,
+    ];
+    let known = |name: &str| in_a_calibration.iter().any(|flaw| flaw.name() == name);
+    if let Some(flaw) = verdict.flaws.iter().find(|name| !known(name)) {
         return Err(refused(format!(
             "{flaw} is a flaw of the estimate, which no calibration can correct: nothing is written"
         )));

@@ -19,6 +19,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bench;
+pub mod conversion;
 pub mod demo;
 pub mod depth_compare;
 pub mod depth_images;

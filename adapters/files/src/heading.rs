@@ -4,7 +4,7 @@ use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::time::{Span, Stamp};
 
 use crate::columns::{Axis, ColumnName, Quantity, TimeUnit};
-use crate::rows::{Row, Separator};
+use crate::row::{Row, Separator};
 
 /// The names of the columns of a table.
 #[derive(Clone, Debug, PartialEq, Eq)]

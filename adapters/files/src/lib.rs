@@ -27,6 +27,7 @@ pub mod leniency;
 pub mod not_text;
 pub mod paths;
 pub mod rigid_file;
+mod row;
 pub mod rows;
 pub mod trajectory;
 pub mod yaml;

@@ -1,5 +1,7 @@
 //! A recording as a [`Dataset`].
 
+mod facts;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,13 +21,13 @@ use crate::camera::{Images, RosCamera, way_out};
 use crate::choose::{Frames, Topics};
 use crate::container::{Recording, Topic};
 use crate::doubts::{Doubts, NO_CAMERA};
+use crate::imu;
 use crate::pixels::{self, DepthUnit, Packing};
 use crate::series::PoseTopic;
 use crate::settings::Settings;
 use crate::streams::{self, GroundTruth, ODOM, SLAM};
 use crate::tf::{TfTree, Transform, list};
 use crate::wire::Reader;
-use crate::{facts, imu};
 
 /// An opened recording.
 pub(crate) struct RosDataset {

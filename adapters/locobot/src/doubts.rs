@@ -71,7 +71,7 @@ pub(crate) fn group(
         several => many.replace("{n}", &several.len().to_string()).replace("{all}", &all.to_string()),
     };
     let names: Vec<&str> = things.iter().map(|(thing, _)| thing.as_str()).collect();
-    Some(Suspicion::new(code, "", message).evidence(crate::tf::list(&names)))
+    Some(Suspicion::new(code, "", message).evidence(crate::names::list(&names)))
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use vice_core::frames::{Rigid, UNIT_TOLERANCE};
 use vice_core::suspicion::Suspicion;
 
 use crate::doubts::{LEFT_OUT, NORMALISED};
-use crate::tf::{Tf, Transform};
+use crate::transform::{Tf, Transform};
 
 /// How far from 1 the length of a quaternion may be and still be normalised.
 const NORMALISED_TOLERANCE: f64 = 0.01;

@@ -16,12 +16,8 @@ use vice_core::trajectory::{NoPose, Trajectory};
 
 pub(crate) use build::TfBuilder;
 
-/// A frame of the tree.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Tf {}
-
-/// A transform of the tree, named `parent_from_child` or `target_from_source`.
-pub(crate) type Transform = Rigid<Tf, Tf>;
+pub(crate) use crate::names::list;
+pub(crate) use crate::transform::Transform;
 
 /// Samples of an edge further apart than this are not interpolated (method page).
 pub(crate) const MAX_EDGE_GAP: Span = Span::from_millis(1000);
@@ -305,17 +301,6 @@ pub(crate) fn clock_jump(what: &str, (before, after): (Stamp, Stamp), times: u64
         // One jump is a clock that was set, many are two clocks.
         _ => DataError::new(format!("{problem}, and {} times more", times - 1))
             .hint("two sources with clocks of their own seem to publish it: record only one of them"),
-    }
-}
-
-/// Some names of many, for a hint.
-pub(crate) fn list<S: AsRef<str>>(names: &[S]) -> String {
-    const SHOWN: usize = 12;
-    let shown: Vec<&str> = names.iter().take(SHOWN).map(AsRef::as_ref).collect();
-    match names.len() {
-        0 => "none".to_string(),
-        n if n > SHOWN => format!("{} and {} more", shown.join(", "), n - SHOWN),
-        _ => shown.join(", "),
     }
 }
 

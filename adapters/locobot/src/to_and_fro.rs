@@ -7,7 +7,7 @@ use vice_core::frames::rotation_angle_rad;
 use vice_core::suspicion::Suspicion;
 
 use crate::doubts::TWO_SOURCES;
-use crate::tf::Transform;
+use crate::transform::Transform;
 
 /// Steps below these are no jumps, whatever comes after: metres and radians.
 const SMALLEST_JUMP: (f64, f64) = (0.02, 0.02);

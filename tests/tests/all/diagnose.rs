@@ -20,8 +20,8 @@ fn every_seed_names(flaw: Flaw, tolerances: &[f64]) {
         let diagnosed = flawed.diagnose(true).unwrap();
         let verdict = &diagnosed.document.verdict;
         assert_eq!(
-            (verdict.kind, verdict.flaws.first()),
-            (VerdictKind::Named, Some(&flaw)),
+            (verdict.kind, verdict.flaws.first().map(String::as_str)),
+            (VerdictKind::Named, Some(flaw.name())),
             "{seed}: {}",
             verdict.sentence
         );
@@ -32,7 +32,7 @@ fn every_seed_names(flaw: Flaw, tolerances: &[f64]) {
         // The same without any reference, the depth from a depth camera.
         let verdict = flawed.diagnose(false).unwrap().document.verdict;
         assert!(
-            verdict.kind != VerdictKind::Named || verdict.flaws[0] == flaw,
+            verdict.kind != VerdictKind::Named || verdict.flaws[0] == flaw.name(),
             "{seed}: {}",
             verdict.sentence
         );

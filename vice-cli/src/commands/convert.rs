@@ -2,9 +2,12 @@
 
 use std::path::PathBuf;
 
+use vice_run::conversion::Conversion;
+use vice_run::core::conventions::Convention;
 use vice_run::core::dataset::GROUND_TRUTH;
 use vice_run::files::atomic::Overwrite;
 use vice_run::files::trajectory::{write_euroc, write_kitti, write_tum};
+use vice_run::request::EstimateSpec;
 
 use crate::inputs::DatasetArgs;
 use crate::terminal::Outcome;
@@ -15,9 +18,15 @@ use crate::terminal::Outcome;
 pub(crate) struct Args {
     #[command(flatten)]
     dataset: DatasetArgs,
-    /// Pose stream of the data set.
-    #[arg(long, value_name = "NAME", default_value = GROUND_TRUTH)]
-    stream: String,
+    /// Pose stream of the data set, or a file of poses.
+    #[arg(long, value_name = "NAME|FILE", default_value = GROUND_TRUTH)]
+    stream: EstimateSpec,
+    /// What the poses are, where they were read as something else: inverse, wxyz, conjugate, camera, mm, ned, ...
+    #[arg(long, value_name = "WHAT,...", value_delimiter = ',')]
+    estimate_as: Vec<Convention>,
+    /// Write the poses without what a diagnosis (vice.diagnosis/1) found in them: convention, clock, scale, drift.
+    #[arg(long, value_name = "DIAGNOSIS.json")]
+    mend: Option<PathBuf>,
     /// Format to write.
     #[arg(long)]
     to: Format,
@@ -41,12 +50,13 @@ enum Format {
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let spec = args.dataset.spec();
-    let dataset = spec.open_raw(&vice_run::formats::registry(&spec.plugins)?)?;
-    if spec.camera.is_some() {
-        spec.camera_name(dataset.as_ref())?;
-    }
-    let trajectory = dataset.trajectory(&args.stream)?;
+    let conversion = Conversion {
+        dataset: args.dataset.spec(),
+        stream: args.stream.clone(),
+        estimate_as: args.estimate_as.clone(),
+        mend: args.mend.clone(),
+    };
+    let trajectory = conversion.trajectory()?;
     let overwrite = if args.force { Overwrite::Replace } else { Overwrite::Refuse };
     match args.to {
         Format::Tum => write_tum(&args.out, &trajectory, overwrite)?,

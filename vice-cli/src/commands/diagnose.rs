@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use vice_run::core::diagnose::{Flaw, Options};
+use vice_run::core::diagnose::{Flaw, OdometryNoise};
 use vice_run::diagnosis::{Looking, diagnose_all};
 use vice_run::files::atomic::Overwrite;
 use vice_run::report::diagnosis_text::render;
@@ -38,21 +38,24 @@ pub(crate) struct Args {
 #[command(next_help_heading = "Diagnosis")]
 pub(crate) struct LookingArgs {
     /// Look for these flaws only: clock-offset, extrinsic-rotation, extrinsic-translation, focal-length,
-    /// principal-point, initial-tilt (of imu-euler), scale, drift.
+    /// principal-point, initial-tilt (of imu-euler), scale, drift, distortion, aspect, clock-rate, clock-step,
+    /// rolling-shutter.
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     flaws: Vec<Flaw>,
-    /// Resamples of points and blocks of time behind intervals and comparisons.
-    #[arg(long, value_name = "N", default_value = "1000", value_parser = clap::value_parser!(u32).range(100..=100_000))]
-    resamples: u32,
-    /// Seed of the resampling.
-    #[arg(long, value_name = "N", default_value = "1")]
-    seed: u64,
+    /// How much the odometry may wander and still be healthy, a root second: 5mm,0.06deg, or wheel, vio, mocap.
+    #[arg(long, value_name = "NOISE", default_value = "vio")]
+    odometry_noise: OdometryNoise,
+    /// No longer means anything: intervals come from the noise of labels and poses, not from resampling.
+    #[arg(long, value_name = "N", hide = true, value_parser = clap::value_parser!(u32).range(100..=100_000))]
+    resamples: Option<u32>,
 }
 
 impl LookingArgs {
     pub(crate) fn spec(&self) -> Looking {
-        let options = Options { resamples: self.resamples as usize, seed: self.seed };
-        Looking { flaws: self.flaws.clone(), options }
+        if self.resamples.is_some() {
+            tracing::warn!("--resamples does nothing any more: nothing is resampled");
+        }
+        Looking { flaws: self.flaws.clone(), odometry_noise: self.odometry_noise }
     }
 }
 

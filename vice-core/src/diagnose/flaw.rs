@@ -9,7 +9,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 /// Number of parameters of all flaws together.
-pub const PARAMETER_COUNT: usize = 17;
+pub const PARAMETER_COUNT: usize = 26;
 
 /// What may be wrong with an estimate or a calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -32,6 +32,17 @@ pub enum Flaw {
     Scale,
     /// The estimate drifts at a constant rate: velocity in its world, and yaw rate about its z axis.
     Drift,
+    /// Coefficients of the lens are off or were left out: used = true + error. Of an equidistant lens `k1` and `k2` are
+    /// those of the angle, and there is no tangential part.
+    Distortion,
+    /// fx alone is too long by a share, against fy.
+    Aspect,
+    /// The estimate's clock runs fast by a share, counted from the camera's first frame.
+    ClockRate,
+    /// The estimate's stamps are later by a constant from some time on.
+    ClockStep,
+    /// Rows are exposed one after the other, over this time from first to last; the stamp is that of the middle row.
+    RollingShutter,
 }
 
 /// One number of a flaw.
@@ -43,40 +54,57 @@ pub struct ParameterInfo {
     pub typical: f64,
     /// Half the step of its central difference, in that unit.
     pub step: f64,
-    /// Beyond this it is no plausible flaw, in that unit: the fit is held by a weak pull to zero of this width.
+    /// Beyond this it is no plausible flaw, in that unit: never named.
     pub plausible: f64,
+    /// The width of what is expected of it before anything is seen, in that unit: one deviation.
+    pub expected: f64,
 }
 
-const fn parameter(name: &'static str, typical: f64, step: f64, plausible: f64) -> ParameterInfo {
-    ParameterInfo { name, typical, step, plausible }
+const fn parameter(
+    name: &'static str,
+    typical: f64,
+    step: f64,
+    plausible: f64,
+    expected: f64,
+) -> ParameterInfo {
+    ParameterInfo { name, typical, step, plausible, expected }
 }
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// The parameters in the order of a [`super::Theta`].
 pub const PARAMETERS: [ParameterInfo; PARAMETER_COUNT] = [
-    parameter("offset_s", 0.01, 0.002, 1.0),
-    parameter("rotation_x_rad", DEGREE, 5e-4, 0.6),
-    parameter("rotation_y_rad", DEGREE, 5e-4, 0.6),
-    parameter("rotation_z_rad", DEGREE, 5e-4, 0.6),
-    parameter("translation_x_m", 0.01, 1e-3, 1.0),
-    parameter("translation_y_m", 0.01, 1e-3, 1.0),
-    parameter("translation_z_m", 0.01, 1e-3, 1.0),
-    parameter("focal_share", 0.01, 5e-4, 0.5),
-    parameter("principal_u_px", 5.0, 0.25, 200.0),
-    parameter("principal_v_px", 5.0, 0.25, 200.0),
-    parameter("tilt_x_rad", 0.5 * DEGREE, 1e-5, 0.6),
-    parameter("tilt_y_rad", 0.5 * DEGREE, 1e-5, 0.6),
-    parameter("scale_share", 0.02, 5e-4, 0.8),
-    parameter("drift_x_m_s", 0.02, 5e-4, 2.0),
-    parameter("drift_y_m_s", 0.02, 5e-4, 2.0),
-    parameter("drift_z_m_s", 0.02, 5e-4, 2.0),
-    parameter("yaw_drift_rad_s", 0.2 * DEGREE, 5e-5, 0.5),
+    parameter("offset_s", 0.01, 0.002, 1.5, 0.03),
+    parameter("rotation_x_rad", DEGREE, 5e-4, 0.35, 1.2 * DEGREE),
+    parameter("rotation_y_rad", DEGREE, 5e-4, 0.35, 1.2 * DEGREE),
+    parameter("rotation_z_rad", DEGREE, 5e-4, 0.35, 1.2 * DEGREE),
+    parameter("translation_x_m", 0.01, 1e-3, 0.5, 0.04),
+    parameter("translation_y_m", 0.01, 1e-3, 0.5, 0.04),
+    parameter("translation_z_m", 0.01, 1e-3, 0.5, 0.04),
+    parameter("focal_share", 0.01, 5e-4, 0.3, 0.025),
+    parameter("principal_u_px", 5.0, 0.25, 80.0, 7.0),
+    parameter("principal_v_px", 5.0, 0.25, 80.0, 7.0),
+    parameter("tilt_x_rad", 0.5 * DEGREE, 1e-5, 0.2, 0.6 * DEGREE),
+    parameter("tilt_y_rad", 0.5 * DEGREE, 1e-5, 0.2, 0.6 * DEGREE),
+    parameter("scale_share", 0.02, 5e-4, 0.6, 0.04),
+    parameter("drift_x_m_s", 0.02, 5e-4, 0.5, 0.03),
+    parameter("drift_y_m_s", 0.02, 5e-4, 0.5, 0.03),
+    parameter("drift_z_m_s", 0.02, 5e-4, 0.5, 0.03),
+    parameter("yaw_drift_rad_s", 0.2 * DEGREE, 5e-5, 0.1, 0.25 * DEGREE),
+    parameter("k1", 0.02, 1e-3, 3.0, 0.08),
+    parameter("k2", 0.02, 1e-3, 6.0, 0.06),
+    parameter("p1", 0.001, 1e-4, 0.05, 0.002),
+    parameter("p2", 0.001, 1e-4, 0.05, 0.002),
+    parameter("aspect_share", 0.01, 5e-4, 0.3, 0.02),
+    parameter("rate_share", 5e-4, 5e-5, 0.7, 0.002),
+    parameter("step_s", 0.05, 0.002, 1.5, 0.08),
+    parameter("step_at_s", 1.0, 0.02, 1e9, 1e9),
+    parameter("readout_s", 0.01, 5e-4, 0.2, 0.015),
 ];
 
 impl Flaw {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 13] = [
         Self::ClockOffset,
         Self::ExtrinsicRotation,
         Self::ExtrinsicTranslation,
@@ -85,6 +113,11 @@ impl Flaw {
         Self::InitialTilt,
         Self::Scale,
         Self::Drift,
+        Self::Distortion,
+        Self::Aspect,
+        Self::ClockRate,
+        Self::ClockStep,
+        Self::RollingShutter,
     ];
 
     /// The name in documents and options.
@@ -98,6 +131,11 @@ impl Flaw {
             Self::InitialTilt => "initial-tilt",
             Self::Scale => "scale",
             Self::Drift => "drift",
+            Self::Distortion => "distortion",
+            Self::Aspect => "aspect",
+            Self::ClockRate => "clock-rate",
+            Self::ClockStep => "clock-step",
+            Self::RollingShutter => "rolling-shutter",
         }
     }
 
@@ -112,6 +150,11 @@ impl Flaw {
             Self::InitialTilt => "initial tilt",
             Self::Scale => "scale",
             Self::Drift => "drift",
+            Self::Distortion => "distortion",
+            Self::Aspect => "aspect (fx against fy)",
+            Self::ClockRate => "clock rate",
+            Self::ClockStep => "clock step",
+            Self::RollingShutter => "rolling shutter",
         }
     }
 
@@ -126,7 +169,41 @@ impl Flaw {
             Self::InitialTilt => 10..12,
             Self::Scale => 12..13,
             Self::Drift => 13..17,
+            Self::Distortion => 17..21,
+            Self::Aspect => 21..22,
+            Self::ClockRate => 22..23,
+            Self::ClockStep => 23..25,
+            Self::RollingShutter => 25..26,
         }
+    }
+
+    /// Those of its parameters that are solved for: the time of a clock step is searched for instead.
+    pub const fn solved(self) -> Range<usize> {
+        match self {
+            Self::ClockStep => 23..24,
+            other => other.parameters(),
+        }
+    }
+
+    /// Whether people meet it often: rarer ones are less likely before anything is seen.
+    pub(super) const fn is_common(self) -> bool {
+        !matches!(
+            self,
+            Self::Distortion | Self::Aspect | Self::ClockRate | Self::ClockStep | Self::RollingShutter
+        )
+    }
+
+    /// Whether it is a flaw of the camera's calibration, on which the depth of key frames may depend.
+    pub(super) const fn of_the_camera(self) -> bool {
+        matches!(
+            self,
+            Self::ExtrinsicRotation
+                | Self::ExtrinsicTranslation
+                | Self::FocalLength
+                | Self::PrincipalPoint
+                | Self::Distortion
+                | Self::Aspect
+        )
     }
 
     /// Labels that would show it, or tell it from others.
@@ -142,6 +219,11 @@ impl Flaw {
             Self::InitialTilt => "longer segments, well after the start of the integration",
             Self::Scale => "near points, followed while the camera moves by metres",
             Self::Drift => "longer segments, and some later in the run",
+            Self::Distortion => "points that move between the middle and the corners of the image",
+            Self::Aspect => "points that move across the image both ways, and a camera that rolls",
+            Self::ClockRate => "labels over a longer part of the run",
+            Self::ClockStep => "labels on both sides of the step, where the camera's speed changes",
+            Self::RollingShutter => "fast motion, with points near the top and the bottom of the image",
         }
     }
 }

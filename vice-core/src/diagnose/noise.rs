@@ -1,208 +1,198 @@
-//! The noise that is left when a flaw is taken out: of labels, of key frames, and of poses that wander.
+//! What is noise and no flaw: of labels, and of an odometry that wanders.
 //!
-//! Residuals of a segment start at its key frame. What its own label was off by, they all share; then the pose wanders
-//! away like a random walk; and each label has noise of its own. Weighting with that covariance is what makes a fit
-//! precise: the wander of a good odometry is slow, what a late clock does is not.
+//! Sizes are known to a factor before anything is seen, and estimated from the labels from there.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use std::fmt;
+use std::str::FromStr;
 
-use super::blocks::{Blocks, Cell};
-use super::problem::Residual;
+use serde::{Deserialize, Serialize};
 
-/// No label is better than this, pixels: exact residuals must not divide by nothing.
-const FLOOR_PX: f64 = 0.01;
-/// What a cell shares is nearly free, in deviations of a label: a key frame may be an outlier.
-const SHARED_SIGMAS: f64 = 10.0;
-/// Fewer labels than this in a cell share nothing that could be told from their own noise.
-const SHARING: usize = 3;
-/// Labels further than this many deviations from what their neighbours say are outliers, and weigh less.
-const OUTLIER: f64 = 3.0;
-/// Cells whose mean square is larger than this, in units of what it should be, are outliers as a whole: what a wrong key
-/// frame does turns with the camera and is no constant.
-const OUTLIER_CELL: f64 = 1.5;
+/// Number of sizes.
+pub(super) const SIZES: usize = 6;
+/// Position of each among them.
+pub(super) const WHITE: usize = 0;
+pub(super) const WALK: usize = 1;
+pub(super) const POSITION: usize = 2;
+pub(super) const YAW: usize = 3;
+pub(super) const LEAN: usize = 4;
+pub(super) const JITTER: usize = 5;
 
-/// Standard deviations of one coordinate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Noise {
-    /// Of a label, pixels.
-    pub(super) label_px: f64,
-    /// Of the wander, pixels after one second; it grows with the root of the time.
-    pub(super) wander_px: f64,
+/// A label's noise, one coordinate, pixels.
+const LABEL_PX: f64 = 0.6;
+/// A label's slow walk after its key frame, pixels a root second.
+const LABEL_WALK_PX: f64 = 0.2;
+/// How well each size is known: one deviation of its logarithm.
+const DEVIATIONS: [f64; SIZES] = [0.5, 0.7, 0.5, 0.5, 0.5, 0.6];
+/// Roll and pitch lean by this times the yaw's walk, jitter of rotation and position by these.
+const LEAN_TO_YAW: f64 = 2.0;
+const JITTER_TO_YAW: f64 = 0.42;
+const JITTER_TO_POSITION: f64 = 0.24;
+/// Noise of a consumer's IMU: m/s² and rad/s a root hertz.
+/// An integration by Euler's method makes as much again.
+const ACCEL: f64 = 4e-3;
+const GYRO: f64 = 3e-4;
+
+/// How much an odometry may wander and still be healthy.
+///
+/// `4mm,0.05deg` (a root second), or `wheel`, `vio`, `mocap`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OdometryNoise {
+    /// Walk of the position, one axis, metres a root second.
+    pub position_m: f64,
+    /// Walk of the yaw, radians a root second.
+    pub yaw_rad: f64,
 }
 
-impl Noise {
-    /// From residuals: differences of labels of a cell grow with the time between them by the wander alone. Medians,
-    /// so that outliers do not count.
-    pub(super) fn of(residuals: &[Residual], blocks: &Blocks) -> Self {
-        let (mut near, mut far) = (Differences::default(), Differences::default());
-        for cell in &blocks.cells {
-            let count = cell.labels.len();
-            let add = |to: &mut Differences, a: usize, b: usize| {
-                let length = (residuals[cell.labels[b]] - residuals[cell.labels[a]]).norm();
-                to.add(length, cell.seconds[b] - cell.seconds[a]);
-            };
-            (1..count).for_each(|i| add(&mut near, i - 1, i));
-            (count / 2..count).filter(|i| *i > 0).for_each(|i| add(&mut far, i - count / 2, i));
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+impl OdometryNoise {
+    /// Wheel encoders and a gyroscope.
+    pub const WHEEL: Self = Self { position_m: 0.01, yaw_rad: 0.12 * DEGREE };
+    /// A good visual-inertial odometry: the default.
+    pub const VIO: Self = Self { position_m: 0.005, yaw_rad: 0.06 * DEGREE };
+    /// A motion-capture system or a total station with an IMU.
+    pub const MOCAP: Self = Self { position_m: 0.001, yaw_rad: 0.02 * DEGREE };
+}
+
+impl Default for OdometryNoise {
+    fn default() -> Self {
+        Self::VIO
+    }
+}
+
+impl fmt::Display for OdometryNoise {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.3}mm,{:.4}deg", self.position_m * 1e3, self.yaw_rad / DEGREE)
+    }
+}
+
+impl FromStr for OdometryNoise {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "wheel" => return Ok(Self::WHEEL),
+            "vio" => return Ok(Self::VIO),
+            "mocap" => return Ok(Self::MOCAP),
+            _ => {}
         }
-        let (Some((near_px2, near_s)), Some((far_px2, far_s))) = (near.variance(), far.variance()) else {
-            let lengths = residuals.iter().map(|r| r.norm()).collect();
-            return Self { label_px: median_px2(lengths).sqrt().max(FLOOR_PX), wander_px: 0.0 };
+        let wrong = || {
+            format!(
+                "`{text}` is no odometry noise: expected wheel, vio, mocap or as 4mm,0.05deg (a root second)"
+            )
         };
-        let slope = if far_s > near_s { ((far_px2 - near_px2) / (far_s - near_s)).max(0.0) } else { 0.0 };
-        let label_px2 = 0.5 * (near_px2 - slope * near_s);
-        // A wander can at most be all of the nearest differences.
-        let wander_px2 = slope.min(near_px2 / near_s.max(f64::MIN_POSITIVE));
-        Self { label_px: label_px2.max(0.0).sqrt().max(FLOOR_PX), wander_px: wander_px2.sqrt() }
-    }
-
-    /// Deviation of a label so long after its key frame, pixels.
-    pub(super) fn after_px(&self, seconds: f64) -> f64 {
-        (self.label_px.powi(2) + self.wander_px.powi(2) * seconds).sqrt()
-    }
-
-    /// Covariance of one coordinate of the labels of a cell, px².
-    fn covariance(&self, cell: &Cell, weights: impl Fn(usize) -> f64) -> DMatrix<f64> {
-        let label_px2 = self.label_px.powi(2);
-        let shared = if cell.labels.len() < SHARING { 0.0 } else { SHARED_SIGMAS.powi(2) * label_px2 };
-        DMatrix::from_fn(cell.labels.len(), cell.labels.len(), |i, j| {
-            let own = if i == j { label_px2 / weights(i) } else { 0.0 };
-            own + shared + self.wander_px.powi(2) * cell.seconds[i].min(cell.seconds[j])
-        })
-    }
-
-    /// What turns the labels of a cell into independent ones.
-    pub(super) fn whitener(&self, cell: &Cell, weights: impl Fn(usize) -> f64) -> Option<Whitener> {
-        self.covariance(cell, weights).cholesky().map(|factor| Whitener { factor, weight: 1.0 })
-    }
-
-    /// The same, the cell as a whole weighted by how well its residuals agree with the noise.
-    pub(super) fn robust_whitener(
-        &self,
-        cell: &Cell,
-        residuals: &[Residual],
-        weights: &[f64],
-    ) -> Option<Whitener> {
-        let mut whitener = self.whitener(cell, |i| weights[cell.labels[i]])?;
-        if cell.labels.len() >= SHARING {
-            let both = [0, 1].map(|axis| coordinate(residuals, cell, axis));
-            let squares = whitener.apply(DMatrix::from_columns(&both)).norm_squared();
-            let excess = squares / (2 * cell.labels.len()) as f64;
-            whitener.weight = (OUTLIER_CELL / excess.max(OUTLIER_CELL)).powi(2);
+        let (position, yaw) = text.split_once(',').ok_or_else(wrong)?;
+        let number = |text: &str, units: [(&str, f64); 3]| -> Option<f64> {
+            let (value, times) =
+                units.iter().find_map(|(unit, times)| Some((text.trim().strip_suffix(unit)?, *times)))?;
+            let value = value.trim().parse::<f64>().ok()? * times;
+            (value > 0.0 && value.is_finite()).then_some(value)
+        };
+        let position_m = number(position, [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)]).ok_or_else(wrong)?;
+        let yaw_rad = number(yaw, [("deg", DEGREE), ("mrad", 1e-3), ("rad", 1.0)]).ok_or_else(wrong)?;
+        if position_m > 10.0 || yaw_rad > 1.0 {
+            return Err(format!("`{text}` is more than an odometry wanders"));
         }
-        Some(whitener)
+        Ok(Self { position_m, yaw_rad })
     }
+}
 
-    /// Robust weights of all labels: by how far each is from what the others of its cell predict.
-    pub(super) fn weights(&self, residuals: &[Residual], blocks: &Blocks) -> Vec<f64> {
-        let mut weights = vec![1.0; residuals.len()];
-        for cell in &blocks.cells {
-            let Some(precision) = self.covariance(cell, |_| 1.0).cholesky().map(|c| c.inverse()) else {
-                continue;
+/// Logarithms of the sizes over their defaults.
+pub(super) type Logs = [f64; SIZES];
+
+/// The model of the noise: defaults, and which of them are free.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NoiseModel {
+    pub(super) odometry: OdometryNoise,
+    /// An integrated IMU wanders by its sensors: position and yaw stand for accelerometer and gyroscope.
+    pub(super) inertial: bool,
+}
+
+/// Sizes in use.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sizes {
+    /// Label, one coordinate, pixels.
+    pub(super) white_px: f64,
+    /// Pixels a root second.
+    pub(super) walk_px: f64,
+    /// Metres a root second.
+    pub(super) position_m: f64,
+    /// Radians a root second.
+    pub(super) yaw_rad: f64,
+    /// Deviation of roll and pitch, radians.
+    pub(super) lean_rad: f64,
+    /// From frame to frame, metres and radians.
+    pub(super) jitter_m: f64,
+    pub(super) jitter_rad: f64,
+    /// m/s² a root hertz, zero unless inertial.
+    pub(super) accel: f64,
+    /// rad/s a root hertz, zero unless inertial.
+    pub(super) gyro: f64,
+}
+
+impl NoiseModel {
+    pub(super) fn sizes(&self, logs: &Logs) -> Sizes {
+        let times = logs.map(f64::exp);
+        let OdometryNoise { position_m, yaw_rad } = self.odometry;
+        let white_px = LABEL_PX * times[WHITE];
+        let walk_px = LABEL_WALK_PX * times[WALK];
+        if self.inertial {
+            return Sizes {
+                white_px,
+                walk_px,
+                position_m: 1e-4,
+                yaw_rad: 1e-5,
+                lean_rad: 0.0,
+                jitter_m: 2e-4,
+                jitter_rad: 5e-5,
+                accel: ACCEL * times[POSITION],
+                gyro: GYRO * times[YAW],
             };
-            let [u, v] = [0, 1].map(|axis| &precision * coordinate(residuals, cell, axis));
-            for (i, label) in cell.labels.iter().enumerate() {
-                let deviations = u[i].hypot(v[i]) / precision[(i, i)].max(f64::MIN_POSITIVE).sqrt();
-                weights[*label] = (OUTLIER / deviations.max(OUTLIER)).powi(2);
-            }
         }
-        weights
-    }
-}
-
-/// The factor of a covariance, and the weight of its cell.
-pub(super) struct Whitener {
-    factor: Cholesky<f64, Dyn>,
-    weight: f64,
-}
-
-impl Whitener {
-    /// Columns made independent, of unit variance.
-    pub(super) fn apply(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
-        self.factor.l_dirty().solve_lower_triangular_mut(&mut columns);
-        columns * self.weight.sqrt()
-    }
-}
-
-/// One coordinate of the residuals of a cell.
-pub(super) fn coordinate(residuals: &[Residual], cell: &Cell, axis: usize) -> DVector<f64> {
-    DVector::from_iterator(cell.labels.len(), cell.labels.iter().map(|l| residuals[*l][axis]))
-}
-
-/// Lengths of differences, and the times they are over.
-#[derive(Default)]
-struct Differences {
-    lengths_px: Vec<f64>,
-    seconds: f64,
-}
-
-impl Differences {
-    fn add(&mut self, length_px: f64, seconds: f64) {
-        self.lengths_px.push(length_px);
-        self.seconds += seconds;
+        Sizes {
+            white_px,
+            walk_px,
+            position_m: position_m * times[POSITION],
+            yaw_rad: yaw_rad * times[YAW],
+            lean_rad: LEAN_TO_YAW * yaw_rad * times[LEAN],
+            jitter_m: JITTER_TO_POSITION * position_m * times[JITTER],
+            jitter_rad: JITTER_TO_YAW * yaw_rad * times[JITTER],
+            accel: 0.0,
+            gyro: 0.0,
+        }
     }
 
-    /// Variance of one coordinate and the mean time; `None` where there are too few.
-    fn variance(self) -> Option<(f64, f64)> {
-        const FEWEST: usize = 8;
-        let count = self.lengths_px.len();
-        (count >= FEWEST).then(|| (median_px2(self.lengths_px), self.seconds / count as f64))
+    /// Which sizes are estimated.
+    pub(super) fn free(&self) -> &'static [usize] {
+        if self.inertial {
+            &[WHITE, WALK, POSITION, YAW]
+        } else {
+            &[WHITE, WALK, POSITION, YAW, LEAN, JITTER]
+        }
     }
-}
 
-/// Variance of one coordinate from the median length: that of a normal distribution in the plane is `√(2 ln 2)`
-/// deviations long.
-fn median_px2(mut lengths_px: Vec<f64>) -> f64 {
-    lengths_px.sort_by(f64::total_cmp);
-    let median = lengths_px.get(lengths_px.len() / 2).copied().unwrap_or(0.0);
-    median * median / (2.0 * std::f64::consts::LN_2)
+    /// How likely sizes are before anything is seen, as a logarithm without its constant.
+    pub(super) fn prior(&self, logs: &Logs) -> f64 {
+        self.free().iter().map(|i| -0.5 * (logs[*i] / DEVIATIONS[*i]).powi(2)).sum()
+    }
+
+    pub(super) fn deviation(size: usize) -> f64 {
+        DEVIATIONS[size]
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::problem::ScoredLabel;
-    use crate::random::SplitMix;
-    use crate::time::Stamp;
-    use nalgebra::Vector2;
-
-    /// Standard normal enough: twelve uniform numbers.
-    fn normal(random: &mut SplitMix) -> f64 {
-        (0..12).map(|_| (random.next() >> 11) as f64 / (1_u64 << 53) as f64).sum::<f64>() - 6.0
-    }
 
     #[test]
-    fn label_noise_and_wander_are_told_apart_and_outliers_do_not_count() {
-        let mut random = SplitMix(5);
-        let (mut labels, mut residuals, mut outliers) = (vec![], vec![], vec![]);
-        for segment in 0..60_i64 {
-            let mut walk = Vector2::zeros();
-            for i in 1..=30_i64 {
-                let at = |ms: i64| Stamp::from_nanos(1_000_000 * ms);
-                labels.push(ScoredLabel {
-                    point: 0,
-                    name: "p".into(),
-                    stamp: at(10_000 * segment + 100 * i),
-                    keyframe: at(10_000 * segment),
-                });
-                let step =
-                    |random: &mut SplitMix, sigma: f64| Vector2::new(normal(random), normal(random)) * sigma;
-                walk += step(&mut random, 0.8 * 0.1_f64.sqrt());
-                let outlier = random.below(50) == 0;
-                outliers.push(outlier);
-                let far = if outlier { Vector2::new(10.0, 0.0) } else { Vector2::zeros() };
-                residuals.push(walk + far + step(&mut random, 0.5));
-            }
+    fn odometry_noise_is_read_with_its_units() {
+        let read: OdometryNoise = "4mm,0.05deg".parse().unwrap();
+        assert!((read.position_m - 0.004).abs() < 1e-12 && (read.yaw_rad - 0.05 * DEGREE).abs() < 1e-12);
+        assert_eq!("wheel".parse(), Ok(OdometryNoise::WHEEL));
+        assert_eq!("1cm, 2mrad".parse(), Ok(OdometryNoise { position_m: 0.01, yaw_rad: 0.002 }));
+        for wrong in ["4,0.05", "4mm", "-4mm,1deg", "nanmm,1deg", "20m,1deg", "good"] {
+            assert!(wrong.parse::<OdometryNoise>().is_err(), "{wrong}");
         }
-        let blocks = Blocks::new(&labels);
-        let noise = Noise::of(&residuals, &blocks);
-        assert!((noise.label_px - 0.5).abs() < 0.06, "{noise:?}");
-        assert!((noise.wander_px - 0.8).abs() < 0.25, "{noise:?}");
-        let weights = noise.weights(&residuals, &blocks);
-        let mean = |which: bool| {
-            let some: Vec<f64> =
-                weights.iter().zip(&outliers).filter(|(_, o)| **o == which).map(|(w, _)| *w).collect();
-            some.iter().sum::<f64>() / some.len() as f64
-        };
-        assert!(mean(true) < 0.15 && mean(false) > 0.95, "{} {}", mean(true), mean(false));
     }
 }

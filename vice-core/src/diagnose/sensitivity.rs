@@ -5,12 +5,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::bootstrap::Resampled;
+use super::fit::Work;
 use super::flaw::{Flaw, PARAMETERS};
-use super::problem::{Problem, rmse_px};
-use super::solve::Fit;
+use super::noise::NoiseModel;
+use super::outliers;
+use super::report::labels_part;
 use super::theta::Theta;
-use super::{Alone, DiagnoseError, Diagnosis, LabelsPart, Observability};
+use super::{DiagnoseError, Diagnosis, LabelsPart, Prepared, flaws_of};
 
 /// The schema's name and version.
 pub const SENSITIVITY_SCHEMA: &str = "vice.sensitivity/1";
@@ -19,6 +20,8 @@ pub const SENSITIVITY_SCHEMA: &str = "vice.sensitivity/1";
 const SIZES: [f64; 8] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
 /// So many standard deviations a flaw must have to be found nineteen times of twenty at 95 %: 1.96 + 1.645.
 const DETECTED: f64 = 3.6;
+/// Deviations of the model are this much too small: half the width of a diagnosis' interval over 1.96.
+const INFLATED: f64 = 1.28;
 /// An RMSE_2D that is larger by this share is seen.
 const SEEN_SHARE: f64 = 0.1;
 
@@ -78,31 +81,37 @@ pub fn sensitivity(
     diagnosis: &Diagnosis<'_>,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<SensitivityDocument, DiagnoseError> {
-    let Diagnosis { evaluation, stream, depth, options, .. } = *diagnosis;
-    let alone = Alone::fit(diagnosis, |done, total| progress(done, 2 * total))?;
-    let Alone { problem, blocks, labels, tried, fits, noise } = alone;
-    let mut done = tried;
-    let sigma_px = noise.after_px(blocks.typical_seconds());
+    let Diagnosis { evaluation, stream, depth, inertial, options, .. } = *diagnosis;
+    let flaws: Vec<Flaw> = flaws_of(diagnosis)?.into_iter().filter(|f| *f != Flaw::ClockStep).collect();
+    let prepared = Prepared::new(diagnosis, &flaws)?;
+    let (scene, motion) = (&prepared.scene, &prepared.motion);
+    let zero = Theta::zero();
+    let noise = NoiseModel { odometry: options.odometry_noise, inertial: inertial.is_some() };
+    let mut work = Work::new(scene, motion, noise, &zero)?;
+    let base = work.residuals(&zero)?;
+    work.weights = outliers::by_neighbours(&work, &base);
+    // The noise that is there with nothing injected.
+    let none = work.newton(&[], &zero, &[0.0; 6], &[], 0)?;
+    let none = work.sized(none, 3);
+    let labels = labels_part(&prepared, &work);
+    let now_px = work.rms(&base);
     let mut curves = Vec::new();
-    for fit in &fits {
-        let deviations = Resampled::new(fit, &blocks, options.resamples, options.seed).deviations();
-        for (i, parameter) in fit.parameters.iter().enumerate() {
-            let effect_px = Observability::of_parameter(fit, i).strongest_px;
-            // What one deviation of the noise amounts to, if the cells of points and blocks are independent.
-            let bound =
-                sigma_px * PARAMETERS[*parameter].typical / (effect_px * (blocks.cells.len() as f64).sqrt());
-            let found_from = DETECTED * deviations.get(i).copied().unwrap_or(f64::INFINITY).max(bound);
-            let points = curve(&problem, *parameter)?;
+    for (done, flaw) in flaws.iter().enumerate() {
+        for parameter in flaw.solved() {
+            let columns = scene.columns(&zero, motion, &[parameter])?;
+            let whitened = work.whiten(&base, &columns, &none.logs, &none.jumps);
+            let squares: f64 = whitened.rows.chunks_exact(2).map(|row| row[1] * row[1]).sum();
+            let found_from = DETECTED * INFLATED / squares.max(f64::MIN_POSITIVE).sqrt();
+            let points = curve(&work, parameter, now_px)?;
             curves.push(Curve {
-                flaw: fit.flaws[0],
-                parameter: PARAMETERS[*parameter].name.to_string(),
-                seen_from: seen_from(rmse_px(&problem.base), &points),
-                found_from: (found_from < PARAMETERS[*parameter].plausible).then_some(found_from),
+                flaw: *flaw,
+                parameter: PARAMETERS[parameter].name.to_string(),
+                seen_from: seen_from(now_px, &points),
+                found_from: (found_from < PARAMETERS[parameter].plausible).then_some(found_from),
                 points,
             });
         }
-        done += 1;
-        progress(done, 2 * tried);
+        progress(done + 1, flaws.len());
     }
     Ok(SensitivityDocument {
         schema: SENSITIVITY_SCHEMA.to_string(),
@@ -112,21 +121,21 @@ pub fn sensitivity(
         stream: evaluation.streams[stream].name.clone(),
         depth: evaluation.depths[depth].name().to_string(),
         labels,
-        rmse_px: rmse_px(&problem.base),
+        rmse_px: prepared.rmse_px,
         curves,
     })
 }
 
 /// RMSE_2D over injected sizes, nothing injected first.
-fn curve(problem: &Problem<'_>, parameter: usize) -> Result<Vec<CurvePoint>, DiagnoseError> {
-    let mut points = vec![CurvePoint { size: 0.0, rmse_px: rmse_px(&problem.base) }];
+fn curve(work: &Work<'_, '_>, parameter: usize, now_px: f64) -> Result<Vec<CurvePoint>, DiagnoseError> {
+    let mut points = vec![CurvePoint { size: 0.0, rmse_px: now_px }];
     for times in SIZES {
         let size = times * PARAMETERS[parameter].typical;
         let mut sum = 0.0;
         for sign in [-1.0, 1.0] {
             let mut theta = Theta::zero();
             theta[parameter] = sign * size;
-            sum += rmse_px(&problem.scored(&theta, &theta)?).powi(2);
+            sum += work.rms(&work.residuals(&theta)?).powi(2);
         }
         points.push(CurvePoint { size, rmse_px: (0.5 * sum).sqrt() });
     }
@@ -144,18 +153,6 @@ fn seen_from(now_px: f64, points: &[CurvePoint]) -> Option<f64> {
         (low <= limit && high > limit)
             .then(|| (a.size.powi(2) + share * (b.size.powi(2) - a.size.powi(2))).sqrt())
     })
-}
-
-/// The part of a fit's parameters that one of them is.
-impl Observability {
-    fn of_parameter(fit: &Fit, index: usize) -> Self {
-        let alone = Fit {
-            parameters: vec![fit.parameters[index]],
-            jacobian: vec![fit.jacobian[index].clone()],
-            ..fit.clone()
-        };
-        Self::of(&alone)
-    }
 }
 
 #[cfg(test)]

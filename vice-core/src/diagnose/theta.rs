@@ -5,7 +5,7 @@ use std::ops::{Index, IndexMut};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::flaw::{Flaw, PARAMETER_COUNT};
-use crate::camera::{Camera, CameraError};
+use crate::camera::{Camera, CameraError, Equidistant, Model, Radtan, Rational};
 use crate::frames::{BodyFromCamera, Rigid};
 
 /// The errors of what is in use, in the order and units of [`super::PARAMETERS`]. Zero where nothing is wrong.
@@ -51,9 +51,28 @@ impl Theta {
     pub fn correct_camera(&self, used: &Camera) -> Result<Camera, CameraError> {
         let [fx, fy, cx, cy] = used.fx_fy_cx_cy();
         let longer = 1.0 + self.of(Flaw::FocalLength)[0];
+        let wider = 1.0 + self.of(Flaw::Aspect)[0];
         let [du, dv] = [self.of(Flaw::PrincipalPoint)[0], self.of(Flaw::PrincipalPoint)[1]];
-        let corrected = [fx / longer, fy / longer, cx - du, cy - dv];
-        Camera::new(used.width(), used.height(), corrected, *used.model())
+        let corrected = [fx / (longer * wider), fy / longer, cx - du, cy - dv];
+        Camera::new(used.width(), used.height(), corrected, self.correct_lens(used.model()))
+    }
+
+    fn correct_lens(&self, used: &Model) -> Model {
+        let off = self.of(Flaw::Distortion);
+        if off.iter().all(|v| *v == 0.0) {
+            return *used;
+        }
+        let [k1, k2, p1, p2] = [off[0], off[1], off[2], off[3]];
+        match *used {
+            Model::Pinhole => Model::Radtan(Radtan { k1: -k1, k2: -k2, p1: -p1, p2: -p2, k3: 0.0 }),
+            Model::Radtan(m) => {
+                Model::Radtan(Radtan { k1: m.k1 - k1, k2: m.k2 - k2, p1: m.p1 - p1, p2: m.p2 - p2, ..m })
+            }
+            Model::Rational(m) => {
+                Model::Rational(Rational { k1: m.k1 - k1, k2: m.k2 - k2, p1: m.p1 - p1, p2: m.p2 - p2, ..m })
+            }
+            Model::Equidistant(m) => Model::Equidistant(Equidistant { k1: m.k1 - k1, k2: m.k2 - k2, ..m }),
+        }
     }
 
     /// The extrinsics without their error.

@@ -1,141 +1,180 @@
-//! Which flaw it is, if any: forward selection on unseen labels.
+//! Which verdict the hypotheses come to.
 
-use super::blocks::Blocks;
-use super::flaw::Flaw;
-use super::noise::Noise;
-use super::problem::{Problem, rmse_px};
-use super::solve::Fit;
-use super::unseen::{Ruler, Unseen};
-use super::{DiagnoseError, Options};
+use super::fit::Fit;
+use super::flaw::{Flaw, PARAMETERS};
+use super::noise::{NoiseModel, POSITION, YAW};
+use super::search::{Ranked, Search};
 
-/// As sure as this a comparison must be to count.
-pub(super) const SURE: f64 = 0.95;
-/// As sure as this a further flaw must be, which is asked for after a first one was found.
-const SURE_OF_MORE: f64 = 0.99;
-/// A flaw must make unseen labels more likely by this factor, as a logarithm ...
-const LIKELIER: f64 = 8.0;
-/// ... and take away this share of the mean squared error: less may be there, but matters to nobody ...
-const SHARE: f64 = 0.1;
-/// ... and this share of what there was before any flaw was taken out.
-const SHARE_OF_ALL: f64 = 0.01;
-/// More flaws at once than these are not told apart by pixels.
-const MOST_FLAWS: usize = 3;
+/// A name needs this share of all hypotheses ...
+const SURE: f64 = 0.88;
+/// ... and no other with as many flaws whose best fit is as good but for this, as a logarithm.
+const RIVAL: f64 = 2.5;
+/// ... or, of one flaw, all hypotheses that hold it this one.
+const SURE_WITH: f64 = 0.97;
+/// A second flaw must add this, as a logarithm.
+const SECOND: f64 = 20.0;
+/// No flaw is said where it has this share of the hypotheses.
+const NONE: f64 = 0.3;
+/// Beyond these times the expected walk an odometry is not healthy.
+const SICK_TIMES: f64 = 1.8;
+/// Jumps that gain more than this are no noise, as a logarithm.
+const SICK_JUMPS: f64 = 25.0;
+/// No flaw is not said where RMSE_2D is beyond these times what labels alone make.
+const ABOVE_LABELS: f64 = 2.7;
+/// Candidates are named until they hold this share.
+const SET: f64 = 0.97;
+/// A direction shows if the labels halve what is expected of it.
+const SHOWN: f64 = 0.5;
 
-/// A fit and how it does on unseen labels.
-pub(super) struct Candidate {
-    pub(super) fit: Fit,
-    pub(super) unseen: Unseen,
+/// What is decided, without words.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Decision {
+    NoFlaw,
+    Named(Vec<Flaw>),
+    CannotTell(Vec<Flaw>),
+    /// Noise or jumps, if that is what it looks like.
+    Unexplained {
+        noise: bool,
+        jumps: bool,
+    },
+    /// How many times as many labels would be needed.
+    TooFew {
+        times: f64,
+    },
 }
 
-/// What was found.
-pub(super) struct Found {
-    /// The flaws fitted together; none where there is none to name.
-    pub(super) named: Candidate,
-    /// Flaws that could each be what is missing, likeliest first; fewer than two where there is no doubt.
-    pub(super) doubt: Vec<Flaw>,
-    /// The least sure of the comparisons behind the name.
-    pub(super) sureness: f64,
+/// Whether the odometry wanders more than is healthy, or jumps.
+pub(super) fn sick(fit: &Fit, noise: &NoiseModel) -> (bool, bool) {
+    let beyond = |size: usize| fit.logs[size] > SICK_TIMES.ln();
+    (!noise.inertial && (beyond(POSITION) || beyond(YAW)), fit.jump_gain > SICK_JUMPS)
 }
 
-/// Compares fits of one problem.
-pub(super) struct Judge<'a> {
-    pub(super) problem: &'a Problem<'a>,
-    pub(super) blocks: &'a Blocks,
-    pub(super) options: Options,
-    /// The noise that the best fit leaves.
-    pub(super) noise: Noise,
-    /// What errors are measured with.
-    pub(super) ruler: Ruler,
+/// Share of all hypotheses with exactly these flaws.
+pub(super) fn share(search: &Search, flaws: &[Flaw]) -> f64 {
+    let same =
+        |r: &&Ranked| r.fit.flaws.len() == flaws.len() && flaws.iter().all(|f| r.fit.flaws.contains(f));
+    search.ranked.iter().filter(same).map(|r| r.posterior).sum()
 }
 
-impl Judge<'_> {
-    pub(super) fn candidate(&self, fit: Fit) -> Candidate {
-        let unseen = Unseen::new(&fit, self.blocks, &self.ruler);
-        Candidate { fit, unseen }
+/// Whether all values are what such a flaw can be.
+fn plausible(fit: &Fit) -> bool {
+    let values = fit.values();
+    fit.parameters.iter().all(|p| values[*p].abs() <= PARAMETERS[*p].plausible)
+}
+
+pub(super) fn decide(search: &Search, noise: &NoiseModel, rmse_px: f64, labels_rmse_px: f64) -> Decision {
+    let best = &search.ranked[0];
+    let (wanders, jumps) = sick(&best.fit, noise);
+    let is_sick = wanders || jumps;
+    let none = share(search, &[]);
+    let is_none = best.fit.flaws.is_empty() || none > NONE;
+    let times = needed(search);
+    if times > 1.0 && (is_none || best.posterior < SURE) {
+        return Decision::TooFew { times };
     }
-
-    pub(super) fn sureness(&self, better: &Candidate, worse: &Candidate) -> f64 {
-        better.unseen.sureness_over(&worse.unseen, self.options.resamples, self.options.seed)
+    if is_none {
+        let high = rmse_px > ABOVE_LABELS * labels_rmse_px;
+        return match is_sick || high {
+            false => Decision::NoFlaw,
+            true => Decision::Unexplained { noise: wanders, jumps },
+        };
     }
-
-    /// `singles` are the flaws fitted alone.
-    pub(super) fn decide(&self, singles: &[Fit]) -> Result<Found, DiagnoseError> {
-        let mut named = self.candidate(Fit::of_nothing(self.problem, self.blocks));
-        let mut sureness: f64 = 1.0;
-        let flaws: Vec<Flaw> = singles.iter().flat_map(|f| f.flaws.iter().copied()).collect();
-        while named.fit.flaws.len() < MOST_FLAWS {
-            let first = named.fit.flaws.is_empty();
-            let candidates = match first {
-                true => singles.iter().map(|fit| self.candidate(fit.clone())).collect(),
-                false => self.with_one_more(&named.fit, &flaws)?,
-            };
-            let sure_enough = if first { SURE } else { self.attainable(SURE_OF_MORE) };
-            let mut better: Vec<(f64, Candidate)> = candidates
-                .into_iter()
-                .map(|c| (self.sureness(&c, &named), c))
-                .filter(|(sure, c)| *sure >= sure_enough && self.matters(c, &named))
-                .collect();
-            better.sort_by(|a, b| a.1.unseen.total().total_cmp(&b.1.unseen.total()));
-            let mut better = better.into_iter();
-            let Some((over_none, best)) = better.next() else { break };
-            let mut doubt = Vec::new();
-            let mut over_others = 1.0_f64;
-            for (_, other) in better {
-                let sure = self.sureness(&best, &other);
-                over_others = over_others.min(sure);
-                if sure < SURE {
-                    doubt.extend(other.fit.flaws.last());
-                }
-            }
-            if !doubt.is_empty() {
-                doubt.splice(0..0, best.fit.flaws.last().copied());
-                let sureness = if first { over_none.min(over_others) } else { sureness };
-                return Ok(Found { named, doubt, sureness });
-            }
-            sureness = sureness.min(over_none).min(over_others);
-            named = best;
+    if is_sick {
+        return Decision::Unexplained { noise: wanders, jumps };
+    }
+    if let Some(core) = core(search) {
+        return Decision::Named(core);
+    }
+    let rivals = rivals(search, &best.fit);
+    if !plausible(&best.fit) {
+        return Decision::Unexplained { noise: false, jumps: false };
+    }
+    let mut candidates: Vec<Flaw> = Vec::new();
+    let mut held = 0.0;
+    for ranked in &search.ranked {
+        if held >= SET {
+            break;
         }
-        Ok(Found { named, doubt: vec![], sureness })
+        held += ranked.posterior;
+        candidates
+            .extend(ranked.fit.flaws.iter().filter(|f| !candidates.contains(f)).copied().collect::<Vec<_>>());
     }
-
-    /// Few blocks cannot be very sure of anything.
-    fn attainable(&self, sure: f64) -> f64 {
-        sure.min(1.0 - 0.5_f64.powi(self.blocks.len() as i32))
+    for rival in rivals {
+        candidates
+            .extend(rival.flaws.iter().filter(|f| !candidates.contains(f)).copied().collect::<Vec<_>>());
     }
-
-    fn matters(&self, candidate: &Candidate, before: &Candidate) -> bool {
-        let [left, there_was] = [candidate, before].map(|c| c.fit.rmse_px().powi(2));
-        let least = (SHARE * there_was).max(SHARE_OF_ALL * rmse_px(&self.problem.base).powi(2));
-        before.unseen.total() - candidate.unseen.total() >= LIKELIER && there_was - left >= least
-    }
-
-    fn with_one_more(&self, fit: &Fit, flaws: &[Flaw]) -> Result<Vec<Candidate>, DiagnoseError> {
-        let others = flaws.iter().filter(|f| !fit.flaws.contains(f));
-        others
-            .map(|flaw| {
-                let together: Vec<Flaw> = fit.flaws.iter().copied().chain([*flaw]).collect();
-                Ok(self.candidate(Fit::solve(self.problem, self.blocks, &together, fit)?))
-            })
-            .collect()
-    }
+    Decision::CannotTell(candidates)
 }
 
-/// Fits each flaw alone. One that cannot be fitted is left out, and said.
-pub(super) fn singles(
-    problem: &Problem<'_>,
-    blocks: &Blocks,
-    flaws: &[Flaw],
-    mut done: impl FnMut(),
-) -> Result<Vec<Fit>, DiagnoseError> {
-    let mut fits = Vec::new();
-    let nothing = Fit::of_nothing(problem, blocks);
-    for flaw in flaws {
-        match Fit::solve(problem, blocks, &[*flaw], &nothing) {
-            Ok(fit) => fits.push(fit),
-            Err(DiagnoseError::CannotEvaluate(why)) => tracing::warn!("{flaw} is not looked for: {why}"),
-            Err(error) => return Err(error),
+/// The flaws that are named: the best hypothesis, or without a second flaw that adds little to it. A small gain may ride on
+/// an outlier that nobody found, so that it makes no name; it is no doubt of the first one either.
+fn core(search: &Search) -> Option<Vec<Flaw>> {
+    let best = &search.ranked[0].fit;
+    let mut core = best;
+    if best.flaws.len() == 2 {
+        let single = search
+            .ranked
+            .iter()
+            .map(|r| &r.fit)
+            .filter(|f| f.flaws.len() == 1 && best.flaws.contains(&f.flaws[0]))
+            .max_by(|a, b| a.score.total_cmp(&b.score))?;
+        if best.score - single.score < SECOND {
+            core = single;
         }
-        done();
     }
-    if fits.is_empty() { Err(DiagnoseError::NoFlaws) } else { Ok(fits) }
+    let with: f64 = search
+        .ranked
+        .iter()
+        .filter(|r| core.flaws.iter().all(|f| r.fit.flaws.contains(f)))
+        .map(|r| r.posterior)
+        .sum();
+    let alone = share(search, &core.flaws);
+    let sure = alone >= SURE || (core.flaws.len() == 1 && with >= SURE_WITH);
+    let without_it = |fit: &&Fit| core.flaws.iter().any(|f| !fit.flaws.contains(f));
+    let unrivalled = rivals(search, core).is_empty() && !rivals(search, best).iter().any(without_it);
+    (sure && unrivalled && plausible(core)).then(|| core.flaws.clone())
+}
+
+/// Others with as many flaws or fewer that fit as well at their best: evidence alone prefers fewer parameters, which is no
+/// evidence.
+fn rivals<'s>(search: &'s Search, of: &Fit) -> Vec<&'s Fit> {
+    let fits_at_best = |fit: &Fit| fit.score - fit.solution.evidence + fit.solution.likelihood;
+    let limit = fits_at_best(of) - RIVAL;
+    search
+        .ranked
+        .iter()
+        .map(|r| &r.fit)
+        .filter(|fit| {
+            !fit.flaws.is_empty()
+                && fit.flaws.len() <= of.flaws.len()
+                && !fit.flaws.iter().all(|f| of.flaws.contains(f))
+                && fits_at_best(fit) > limit
+        })
+        .collect()
+}
+
+/// How many times as many labels it takes until a direction of some flaw shows; 1 or less where one does.
+fn needed(search: &Search) -> f64 {
+    let singles = search.ranked.iter().map(|r| &r.fit).filter(|f| f.flaws.len() == 1);
+    let narrowest = singles
+        .flat_map(|fit| {
+            let covariance = &fit.solution.covariance;
+            fit.parameters
+                .iter()
+                .enumerate()
+                .map(|(i, p)| covariance[(i, i)].sqrt() / PARAMETERS[*p].expected)
+                .collect::<Vec<_>>()
+        })
+        .fold(f64::INFINITY, f64::min);
+    if narrowest.is_finite() { (narrowest / SHOWN).powi(2) } else { f64::INFINITY }
+}
+
+/// Number of directions of a fit's parameters that the labels show.
+pub(super) fn rank(fit: &Fit) -> usize {
+    let n = fit.parameters.len();
+    let scaled = nalgebra::DMatrix::from_fn(n, n, |a, b| {
+        fit.solution.covariance[(a, b)]
+            / (PARAMETERS[fit.parameters[a]].expected * PARAMETERS[fit.parameters[b]].expected)
+    });
+    scaled.symmetric_eigenvalues().iter().filter(|e| **e < SHOWN * SHOWN).count()
 }

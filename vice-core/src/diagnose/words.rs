@@ -7,7 +7,12 @@ use super::flaw::Flaw;
 pub(super) fn line(flaw: Flaw, parameters: &[Estimated], size: Option<&Estimated>) -> String {
     let numbers = match (flaw, parameters, size) {
         (Flaw::ClockOffset, [offset], _) => number(offset, 1e3, "ms", true),
-        (Flaw::FocalLength | Flaw::Scale, [share], _) => number(share, 1e2, "%", true),
+        (Flaw::FocalLength | Flaw::Scale | Flaw::Aspect, [share], _) => number(share, 1e2, "%", true),
+        (Flaw::ClockRate, [share], _) => number(share, 1e6, "ppm", true),
+        (Flaw::RollingShutter, [time], _) => number(time, 1e3, "ms", true),
+        (Flaw::ClockStep, [step, at], _) => {
+            format!("{} from {} on", number(step, 1e3, "ms", true), number(at, 1.0, "s", false))
+        }
         (Flaw::ExtrinsicRotation, [x, y, z], Some(size)) => {
             format!("{} ({})", number(size, DEGREES, "°", false), axes(&[x, y, z], DEGREES, "°"))
         }
@@ -86,15 +91,27 @@ pub(super) fn correction(flaw: Flaw, values: &[f64], time_offset_s: f64) -> Stri
             "the estimate drifts: calibrate its source; until then add [{}] (m/s, and rad/s of yaw) times the time",
             all(1.0)
         ),
+        Flaw::Distortion => format!("add [{}] to k1, k2, p1, p2", all(1.0)),
+        Flaw::Aspect => format!("multiply fx by {:.6}", 1.0 / (1.0 + values[0])),
+        Flaw::ClockRate => {
+            format!("divide the estimate's times since the camera's first frame by {:.9}", 1.0 + values[0])
+        }
+        Flaw::ClockStep => format!(
+            "take {:.6} s off the estimate's stamps from {:.3} s after the camera's first frame on",
+            values[0], values[1]
+        ),
+        Flaw::RollingShutter => format!(
+            "the rows of an image are exposed over {:.6} s: use a global shutter, or stamps of the rows",
+            values[0]
+        ),
     }
 }
 
 /// `a`, `a and b`, `a, b and c`.
-pub(super) fn listed(flaws: &[Flaw], last: &str) -> String {
-    let words: Vec<&str> = flaws.iter().map(|f| f.words()).collect();
-    match words.as_slice() {
+pub(super) fn listed(words: &[String], last: &str) -> String {
+    match words {
         [] => String::new(),
-        [one] => (*one).to_string(),
+        [one] => one.clone(),
         [rest @ .., end] => format!("{} {last} {end}", rest.join(", ")),
     }
 }
@@ -120,7 +137,7 @@ mod tests {
             "extrinsic rotation: 0.57° [0.52, 0.63] (x +0.00, y +0.57, z +0.00°)"
         );
         assert_eq!(
-            listed(&[Flaw::Scale, Flaw::Drift, Flaw::ClockOffset], "and"),
+            listed(&["scale", "drift", "clock offset"].map(str::to_string), "and"),
             "scale, drift and clock offset"
         );
     }

@@ -25,7 +25,7 @@ pub use select::{Observations, SelectedKeyframe, Selection, Window};
 pub use streams::Stream;
 
 use depth_doubts::{OtherDepths, depth_doubts};
-use depths::{DepthTable, SourceDepths, keyframe_depths, pixel_key};
+use depths::{DepthTable, SourceDepths, pixel_key};
 use score::Scorer;
 use streams::PosesAtFrames;
 
@@ -156,6 +156,13 @@ pub struct Evaluation<'a> {
     pub align: Alignment,
     /// Whether the document lists the scored samples.
     pub keep_samples: bool,
+}
+
+impl Evaluation<'_> {
+    /// Index of the stream that places the camera for the depth of a stream.
+    pub const fn anchor_of(&self, stream: usize) -> usize {
+        if self.own_anchors { stream } else { self.anchor }
+    }
 }
 
 /// Takes the scored samples of one point, of the pose stream and depth source that are named.

@@ -1,37 +1,16 @@
 //! A stream scored once more with another camera and other poses, by the same stages: what a diagnosis varies.
 
+use super::depths::keyframe_depths;
 use super::score::{Scorer, score};
-pub(crate) use super::streams::PosesAtFrames;
-use super::{DepthTable, EvaluateError, Evaluation, extrinsics, keyframe_depths};
+use super::{EvaluateError, Evaluation, extrinsics};
 use crate::camera::Camera;
-use crate::depth::{DepthSample, DepthSource};
 use crate::error::DataResult;
 use crate::frames::BodyFromCamera;
 use crate::metrics::align::Alignment;
-use crate::result::Sample;
-use crate::time::Stamp;
+use crate::metrics::pixel::pooled_rmse_px;
 
 /// Extrinsics at the selected frames.
 pub(crate) type CamerasAtFrames = Vec<Option<BodyFromCamera>>;
-
-/// Depths of the key-frame pixels, to be used with several trials.
-pub(crate) struct TrialDepths(DepthTable);
-
-impl TrialDepths {
-    /// All of them longer by a factor.
-    pub(crate) fn times(&self, factor: f64) -> Self {
-        let longer = |sample: DepthSample| DepthSample { z_m: factor * sample.z_m, ..sample };
-        Self(self.0.iter().map(|(at, depth)| (*at, depth.map(longer))).collect())
-    }
-
-    /// The median of the shares by which they differ from others, where both have one; zero where none has.
-    pub(crate) fn typical_change(&self, other: &Self) -> f64 {
-        let pairs = self.0.iter().filter_map(|(at, depth)| Some((depth.ok()?, other.0.get(at)?.ok()?)));
-        let mut changes: Vec<f64> = pairs.map(|(a, b)| (a.z_m / b.z_m).ln().abs()).collect();
-        changes.sort_by(f64::total_cmp);
-        changes.get(changes.len() / 2).copied().unwrap_or(0.0)
-    }
-}
 
 /// The stages of an evaluation, one by one.
 pub(crate) struct Trial<'a> {
@@ -43,9 +22,9 @@ impl<'a> Trial<'a> {
         Self { evaluation }
     }
 
-    /// Stamps of the selected frames, ascending: those of key frames and samples.
-    pub(crate) fn stamps(&self) -> Vec<Stamp> {
-        self.evaluation.selection.frames.iter().map(|f| self.evaluation.frames[*f]).collect()
+    /// Indices of the selected frames, ascending: those of key frames and samples.
+    pub(crate) fn frame_indices(&self) -> &'a [usize] {
+        &self.evaluation.selection.frames
     }
 
     /// The extrinsics as they are in use, at the selected frames.
@@ -53,30 +32,25 @@ impl<'a> Trial<'a> {
         extrinsics(self.evaluation)
     }
 
-    /// Stage 3 with another camera and anchor.
-    pub(crate) fn depths(
-        &self,
-        source: &dyn DepthSource,
-        camera: &Camera,
-        cameras: &CamerasAtFrames,
-        anchor: &PosesAtFrames,
-    ) -> Result<TrialDepths, EvaluateError> {
-        keyframe_depths(&self.with(camera), source, cameras, anchor).map(TrialDepths)
-    }
-
-    /// Stage 4 with another camera and other poses: the scored samples by point and time.
-    pub(crate) fn samples(
-        &self,
-        camera: &Camera,
-        cameras: &CamerasAtFrames,
-        poses: &PosesAtFrames,
-        depths: &TrialDepths,
-    ) -> Vec<Sample> {
+    /// RMSE_2D of all points together, as an evaluation gives it, pixels; and how many labels it rests on.
+    pub(crate) fn pooled_rmse_px(&self, stream: usize, depth: usize) -> Result<(f64, usize), EvaluateError> {
+        let e = self.evaluation;
+        let at = |stream: usize| e.streams[stream].poses_at(e.frames, &e.selection.frames, e.max_gap);
+        let cameras = self.cameras()?;
+        let evaluation = self.with(e.camera);
+        let depths = keyframe_depths(&evaluation, e.depths[depth], &cameras, &at(e.anchor_of(stream)))?;
         // Only a sink can fail, and there is none.
-        let evaluation = &self.with(camera);
-        let depths = &depths.0;
-        let scorer = Scorer { evaluation, cameras, poses, depths, keep_samples: true, carries: false };
-        score(&scorer, None).map_or_else(|_| Vec::new(), |all| all.samples)
+        let poses = &at(stream);
+        let scorer = Scorer {
+            evaluation: &evaluation,
+            cameras: &cameras,
+            poses,
+            depths: &depths,
+            keep_samples: false,
+            carries: false,
+        };
+        let errors = score(&scorer, None).map_or_else(|_| Vec::new(), |all| all.errors);
+        Ok((pooled_rmse_px(&errors).unwrap_or(0.0), errors.iter().map(|e| e.count as usize).sum()))
     }
 
     fn with<'b>(&'b self, camera: &'b Camera) -> Evaluation<'b> {
@@ -95,7 +69,7 @@ impl<'a> Trial<'a> {
             max_gap: e.max_gap,
             subsets: None,
             align: Alignment::None,
-            keep_samples: true,
+            keep_samples: false,
         }
     }
 }

@@ -19,7 +19,7 @@ fn write_text(text: &mut String, document: &DiagnosisDocument) -> std::fmt::Resu
     let (labels, verdict) = (&document.labels, &document.verdict);
     writeln!(
         text,
-        "{}, {} with {}: {:.3} px over {} labels of {} points ({} blocks of {})\n",
+        "{}, {} with {}: {:.3} px over {} labels of {} points ({} {}, {:.1} s)\n",
         printable(&document.dataset),
         printable(&document.stream),
         printable(&document.depth),
@@ -28,6 +28,7 @@ fn write_text(text: &mut String, document: &DiagnosisDocument) -> std::fmt::Resu
         labels.points,
         labels.blocks,
         labels.blocks_of,
+        labels.seconds,
     )?;
     let mut grid = vec![
         ["flaw, fitted alone [95 %]", "leaves px", "explains", "likelier", "labels show"]
@@ -59,7 +60,7 @@ fn write_text(text: &mut String, document: &DiagnosisDocument) -> std::fmt::Resu
             }
         }
         VerdictKind::CannotTell => writeln!(text, "sureness: {:.1} %", 100.0 * verdict.sureness)?,
-        VerdictKind::NoFlaw => {}
+        _ => {}
     }
     for help in &verdict.labels_that_help {
         writeln!(text, "labels that would help: {help}")?;

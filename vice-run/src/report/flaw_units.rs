@@ -9,7 +9,10 @@ pub(crate) fn shown_unit(curve: &Curve) -> (&'static str, f64) {
         Flaw::ClockOffset => ("ms", 1e3),
         Flaw::ExtrinsicRotation | Flaw::InitialTilt => ("°", degrees),
         Flaw::ExtrinsicTranslation => ("mm", 1e3),
-        Flaw::FocalLength | Flaw::Scale => ("%", 1e2),
+        Flaw::FocalLength | Flaw::Scale | Flaw::Aspect => ("%", 1e2),
+        Flaw::ClockRate => ("ppm", 1e6),
+        Flaw::RollingShutter => ("ms", 1e3),
+        Flaw::Distortion => ("", 1.0),
         Flaw::Drift if curve.parameter.ends_with("rad_s") => ("°/s", degrees),
         Flaw::Drift => ("mm/s", 1e3),
         _ => ("px", 1.0),
@@ -20,7 +23,15 @@ pub(crate) fn shown_unit(curve: &Curve) -> (&'static str, f64) {
 pub(crate) fn axis(curve: &Curve) -> &'static str {
     let parts: Vec<&str> = curve.parameter.split('_').collect();
     match curve.flaw {
-        Flaw::ClockOffset | Flaw::FocalLength | Flaw::Scale => "",
+        Flaw::ClockOffset
+        | Flaw::FocalLength
+        | Flaw::Scale
+        | Flaw::Aspect
+        | Flaw::ClockRate
+        | Flaw::RollingShutter => "",
+        Flaw::Distortion => {
+            ["k1", "k2", "p1", "p2"].into_iter().find(|name| parts.contains(name)).unwrap_or("")
+        }
         Flaw::Drift if parts.first() == Some(&"yaw") => "yaw",
         _ => ["x", "y", "z", "u", "v"].into_iter().find(|axis| parts.contains(axis)).unwrap_or(""),
     }

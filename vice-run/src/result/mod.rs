@@ -11,8 +11,9 @@ use serde::{Deserialize, Serialize};
 use vice_core::result::{DatasetPart, Evaluated, PathPart, PixelPart, TrajectoryPart};
 use vice_core::suspicion::Suspicions;
 
+use read::parse;
 pub use read::read;
-use read::{parse, read_bytes};
+pub(crate) use read::read_bytes;
 
 use crate::request::Request;
 

@@ -9,7 +9,7 @@ use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::suspicion::Suspicion;
 
 use super::{db3, mcap, ros1, unpack};
-use crate::tf::list;
+use crate::names::list;
 
 /// The file that describes a rosbag2 folder.
 const METADATA: &str = "metadata.yaml";

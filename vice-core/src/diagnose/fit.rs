@@ -1,0 +1,494 @@
+//! A hypothesis fitted to the labels: a set of flaws, their values, the sizes of the noise, and how likely all of it is.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::DiagnoseError;
+use super::filter::{Jump, Shifts, Weights, Whitened, whiten};
+use super::flaw::{Flaw, PARAMETERS};
+use super::geometry::Geometry;
+use super::motion::Motion;
+use super::noise::{Logs, NoiseModel};
+use super::scene::{LOST_PX, Residual, Scene};
+use super::theta::Theta;
+
+/// What is expected of a parameter before anything is seen: normal with its expected width, or four times wider.
+const NARROW: f64 = 0.7;
+const WIDE_TIMES: f64 = 4.0;
+/// Step of a size's logarithm in differences.
+const SIZE_STEP: f64 = 0.1;
+/// Variance of a dead label over that of a usual one.
+const DEAD: f64 = 1e8;
+/// Three frames may have a jump if their squares exceed their number by so many deviations.
+const EXCESS: f64 = 3.8;
+/// Longest step of a size's logarithm.
+const LONGEST_SIZE_STEP: f64 = 0.8;
+
+/// What hypotheses are fitted to.
+pub(super) struct Work<'s, 'a> {
+    pub(super) scene: &'s Scene<'a>,
+    pub(super) motion: &'s Motion<'a>,
+    pub(super) geometry: Geometry,
+    pub(super) noise: NoiseModel,
+    pub(super) weights: Weights,
+    /// Labels that cannot be carried where the geometry was taken: they count for nothing.
+    pub(super) dead: Vec<bool>,
+}
+
+/// Normal equations of whitened columns: products of the derivatives, with the residuals, and of these.
+#[derive(Clone, Debug)]
+pub(super) struct Normal {
+    pub(super) hessian: DMatrix<f64>,
+    pub(super) gradient: DVector<f64>,
+    pub(super) squares: f64,
+    pub(super) log_variances: f64,
+}
+
+impl Normal {
+    /// Of some of the columns, which count from 1.
+    pub(super) fn of(whitened: &Whitened, columns: &[usize]) -> Self {
+        let p = columns.len();
+        let mut hessian = DMatrix::zeros(p, p);
+        let mut gradient = DVector::zeros(p);
+        let mut squares = 0.0;
+        for row in whitened.rows.chunks_exact(whitened.width) {
+            squares += row[0] * row[0];
+            for (a, ca) in columns.iter().enumerate() {
+                gradient[a] += row[*ca] * row[0];
+                for (b, cb) in columns.iter().enumerate().take(a + 1) {
+                    hessian[(a, b)] += row[*ca] * row[*cb];
+                }
+            }
+        }
+        for a in 0..p {
+            for b in 0..a {
+                hessian[(b, a)] = hessian[(a, b)];
+            }
+        }
+        Self { hessian, gradient, squares, log_variances: whitened.log_variances.iter().sum() }
+    }
+
+    /// Solved around the values that were linearised at.
+    pub(super) fn solve(&self, values: &[f64], expected: &[f64]) -> Solution {
+        let p = values.len();
+        let fixed = -0.5 * self.log_variances;
+        if p == 0 {
+            let likelihood = fixed - 0.5 * self.squares;
+            return Solution {
+                step: DVector::zeros(0),
+                covariance: DMatrix::zeros(0, 0),
+                evidence: likelihood,
+                likelihood,
+            };
+        }
+        let x = DVector::from_column_slice(values);
+        let with = |times: f64| {
+            let precision = DVector::from_iterator(p, expected.iter().map(|s| (s * times).powi(-2)));
+            let a = &self.hessian + DMatrix::from_diagonal(&precision);
+            let b = &self.gradient + precision.component_mul(&x);
+            let chol = a.cholesky()?;
+            let step = -chol.solve(&b);
+            let log_det: f64 = chol.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
+            let log_prior: f64 = expected.iter().map(|s| 2.0 * (s * times).ln()).sum();
+            let cost = self.squares + x.dot(&precision.component_mul(&x)) + b.dot(&step);
+            Some((fixed - 0.5 * cost - 0.5 * log_det - 0.5 * log_prior, step, chol.inverse()))
+        };
+        let (Some(narrow), Some(wide)) = (with(1.0), with(WIDE_TIMES)) else {
+            return Solution {
+                step: DVector::zeros(p),
+                covariance: DMatrix::identity(p, p) * 1e12,
+                evidence: f64::NEG_INFINITY,
+                likelihood: f64::NEG_INFINITY,
+            };
+        };
+        let (a, b) = (narrow.0 + NARROW.ln(), wide.0 + (1.0 - NARROW).ln());
+        let most = a.max(b);
+        let evidence = most + ((a - most).exp() + (b - most).exp()).ln();
+        // The wider pull is weak: what is said of the values comes from the labels.
+        let (_, step, covariance) = wide;
+        let moved = self.squares + 2.0 * self.gradient.dot(&step) + step.dot(&(&self.hessian * &step));
+        Solution { step, covariance, evidence, likelihood: fixed - 0.5 * moved }
+    }
+}
+
+/// What normal equations come to.
+#[derive(Clone, Debug)]
+pub(super) struct Solution {
+    /// From the values that were linearised at.
+    pub(super) step: DVector<f64>,
+    pub(super) covariance: DMatrix<f64>,
+    /// How likely the labels are with the values integrated over, as a logarithm.
+    pub(super) evidence: f64,
+    /// How likely they are at the best values, as a logarithm.
+    pub(super) likelihood: f64,
+}
+
+/// A fitted hypothesis.
+#[derive(Clone, Debug)]
+pub(super) struct Fit {
+    pub(super) flaws: Vec<Flaw>,
+    /// The parameters that are solved for.
+    pub(super) parameters: Vec<usize>,
+    /// Where residuals and columns were taken.
+    pub(super) theta: Theta,
+    pub(super) residuals: Vec<Residual>,
+    pub(super) columns: Vec<Vec<Residual>>,
+    pub(super) logs: Logs,
+    pub(super) jumps: Vec<Jump>,
+    /// What the jumps gain, as a logarithm, before their cost.
+    pub(super) jump_gain: f64,
+    pub(super) solution: Solution,
+    /// Evidence with what sizes and jumps cost.
+    pub(super) score: f64,
+}
+
+impl Fit {
+    /// Values with the last step taken.
+    pub(super) fn values(&self) -> Theta {
+        let mut theta = self.theta;
+        for (parameter, step) in self.parameters.iter().zip(self.solution.step.iter()) {
+            theta[*parameter] += step;
+        }
+        theta
+    }
+
+    pub(super) fn linearised_at(&self) -> Vec<f64> {
+        self.parameters.iter().map(|p| self.theta[*p]).collect()
+    }
+
+    /// Residuals with the last step taken.
+    pub(super) fn residuals_now(&self) -> Vec<Residual> {
+        let mut residuals = self.residuals.clone();
+        for (column, step) in self.columns.iter().zip(self.solution.step.iter()) {
+            residuals.iter_mut().zip(column).for_each(|(r, c)| *r += c * *step);
+        }
+        residuals
+    }
+}
+
+pub(super) fn parameters_of(flaws: &[Flaw]) -> Vec<usize> {
+    flaws.iter().flat_map(|f| f.solved()).collect()
+}
+
+pub(super) fn expected_of(parameters: &[usize]) -> Vec<f64> {
+    parameters.iter().map(|p| PARAMETERS[*p].expected).collect()
+}
+
+/// What jumps cost beside what they gain: when they were, and how large.
+pub(super) fn jump_cost(frames: usize) -> f64 {
+    (frames.max(2) as f64).ln() + 2.0
+}
+
+impl<'s, 'a> Work<'s, 'a> {
+    /// Geometry at some values, and all labels of usual weight that can be carried there.
+    pub(super) fn new(
+        scene: &'s Scene<'a>,
+        motion: &'s Motion<'a>,
+        noise: NoiseModel,
+        theta: &Theta,
+    ) -> Result<Self, DiagnoseError> {
+        let view = scene.view(theta, motion)?;
+        let geometry = Geometry::new(scene, &view, noise.inertial);
+        let dead: Vec<bool> = scene.labels.iter().map(|l| view.residual(l).is_none()).collect();
+        let keys = vec![1.0; scene.segments.len()];
+        let weights = Weights { labels: vec![1.0; scene.labels.len()], keys };
+        let mut work = Self { scene, motion, geometry, noise, weights, dead };
+        work.weights = work.without_dead(work.weights.clone());
+        Ok(work)
+    }
+
+    /// Weights under which dead labels count for nothing.
+    pub(super) fn without_dead(&self, mut weights: Weights) -> Weights {
+        weights.labels.iter_mut().zip(&self.dead).filter(|(_, dead)| **dead).for_each(|(w, _)| *w = DEAD);
+        weights
+    }
+
+    /// RMS length of the labels that can be carried, pixels.
+    pub(super) fn rms(&self, residuals: &[Residual]) -> f64 {
+        let alive = || residuals.iter().zip(&self.dead).filter(|(_, dead)| !**dead).map(|(r, _)| r);
+        (alive().map(|r| r.norm_squared()).sum::<f64>() / alive().count().max(1) as f64).sqrt()
+    }
+}
+
+impl Work<'_, '_> {
+    pub(super) fn residuals(&self, theta: &Theta) -> Result<Vec<Residual>, DiagnoseError> {
+        let lost = Residual::new(LOST_PX, LOST_PX);
+        Ok(self
+            .scene
+            .residuals(theta, self.motion)?
+            .into_iter()
+            .map(|r| r.map_or(lost, |r| if r.norm() < LOST_PX { r } else { r * (LOST_PX / r.norm()) }))
+            .collect())
+    }
+
+    pub(super) fn whiten(
+        &self,
+        residuals: &[Residual],
+        columns: &[Vec<Residual>],
+        logs: &Logs,
+        jumps: &[Jump],
+    ) -> Whitened {
+        let all: Vec<&[Residual]> =
+            std::iter::once(residuals).chain(columns.iter().map(Vec::as_slice)).collect();
+        whiten(&self.geometry, &all, &self.noise.sizes(logs), &self.weights, jumps, Shifts::Nobodys)
+    }
+
+    /// The solution of a linearised fit with other sizes or jumps.
+    pub(super) fn solve(&self, fit: &Fit, logs: &Logs, jumps: &[Jump]) -> (Solution, Whitened) {
+        let whitened = self.whiten(&fit.residuals, &fit.columns, logs, jumps);
+        let columns: Vec<usize> = (1..whitened.width).collect();
+        let solution =
+            Normal::of(&whitened, &columns).solve(&fit.linearised_at(), &expected_of(&fit.parameters));
+        (solution, whitened)
+    }
+
+    fn score(&self, solution: &Solution, logs: &Logs, jumps: &[Jump]) -> f64 {
+        solution.evidence + self.noise.prior(logs)
+            - jumps.len() as f64 * jump_cost(self.geometry.frames.len())
+    }
+
+    /// The same work, to be changed.
+    pub(super) fn same(&self) -> Self {
+        Self {
+            scene: self.scene,
+            motion: self.motion,
+            geometry: self.geometry.clone(),
+            noise: self.noise,
+            weights: self.weights.clone(),
+            dead: self.dead.clone(),
+        }
+    }
+
+    /// A fit with its solution as the outliers, sizes and jumps are now.
+    pub(super) fn rescored(&self, fit: Fit) -> Fit {
+        let (solution, _) = self.solve(&fit, &fit.logs, &fit.jumps);
+        let score = self.score(&solution, &fit.logs, &fit.jumps);
+        Fit { solution, score, ..fit }
+    }
+
+    /// A hypothesis by Gauss-Newton's method from some values, at given sizes.
+    pub(super) fn newton(
+        &self,
+        flaws: &[Flaw],
+        start: &Theta,
+        logs: &Logs,
+        jumps: &[Jump],
+        steps: usize,
+    ) -> Result<Fit, DiagnoseError> {
+        let parameters = parameters_of(flaws);
+        let expected = expected_of(&parameters);
+        let mut theta = *start;
+        let mut best: Option<(f64, Fit)> = None;
+        for i in 0..=steps {
+            let evaluated = self
+                .residuals(&theta)
+                .and_then(|r| Ok((r, self.scene.columns(&theta, self.motion, &parameters)?)));
+            let (residuals, columns) = match (evaluated, &best) {
+                (Ok(evaluated), _) => evaluated,
+                (Err(error), None) => return Err(error),
+                (Err(_), Some(_)) => break,
+            };
+            let fit = Fit {
+                flaws: flaws.to_vec(),
+                parameters: parameters.clone(),
+                theta,
+                residuals,
+                columns,
+                logs: *logs,
+                jumps: jumps.to_vec(),
+                jump_gain: 0.0,
+                solution: Solution {
+                    step: DVector::zeros(0),
+                    covariance: DMatrix::zeros(0, 0),
+                    evidence: 0.0,
+                    likelihood: 0.0,
+                },
+                score: 0.0,
+            };
+            let whitened = self.whiten(&fit.residuals, &fit.columns, logs, jumps);
+            let all: Vec<usize> = (1..whitened.width).collect();
+            let normal = Normal::of(&whitened, &all);
+            let solution = normal.solve(&fit.linearised_at(), &expected);
+            let pull: f64 =
+                fit.linearised_at().iter().zip(&expected).map(|(x, s)| (x / (WIDE_TIMES * s)).powi(2)).sum();
+            let cost = normal.squares + pull;
+            let score = self.score(&solution, logs, jumps);
+            let fit = Fit { solution, score, ..fit };
+            match &mut best {
+                Some((least, kept)) if cost > *least => {
+                    // Too far: half of the way, from where it was best.
+                    for (parameter, step) in parameters.iter().zip(kept.solution.step.iter()) {
+                        let whole = kept.theta[*parameter] + step;
+                        let share =
+                            (theta[*parameter] - kept.theta[*parameter]) / (whole - kept.theta[*parameter]);
+                        let share = if share.is_finite() { 0.4 * share } else { 0.0 };
+                        theta[*parameter] = kept.theta[*parameter] + share * step;
+                    }
+                    continue;
+                }
+                _ => {}
+            }
+            let done = fit
+                .solution
+                .step
+                .iter()
+                .zip(&parameters)
+                .all(|(s, p)| s.abs() < 0.02 * PARAMETERS[*p].typical);
+            theta = fit.values();
+            let better = best.as_ref().is_none_or(|(least, _)| cost <= *least);
+            if better {
+                best = Some((cost, fit));
+            }
+            if done || i == steps {
+                break;
+            }
+        }
+        best.map(|(_, fit)| fit)
+            .ok_or_else(|| DiagnoseError::CannotEvaluate("the fit does not start".to_string()))
+    }
+
+    /// With sizes of noise of its own: the likeliest ones, by the scores of the frames.
+    pub(super) fn sized(&self, fit: Fit, rounds: usize) -> Fit {
+        let mut fit = fit;
+        let free = self.noise.free();
+        for _ in 0..rounds {
+            let (solution, whitened) = self.solve(&fit, &fit.logs, &fit.jumps);
+            let now = self.score(&solution, &fit.logs, &fit.jumps);
+            let frames = frame_likelihoods(&whitened, &solution.step);
+            let moved: Vec<(f64, Vec<f64>)> = free
+                .par_iter()
+                .map(|size| {
+                    let mut logs = fit.logs;
+                    logs[*size] += SIZE_STEP;
+                    let (other, whitened) = self.solve(&fit, &logs, &fit.jumps);
+                    let slope = (self.score(&other, &logs, &fit.jumps) - now) / SIZE_STEP;
+                    let scores: Vec<f64> = frame_likelihoods(&whitened, &solution.step)
+                        .iter()
+                        .zip(&frames)
+                        .map(|(a, b)| (a - b) / SIZE_STEP)
+                        .collect();
+                    (slope, scores)
+                })
+                .collect();
+            let n = free.len();
+            let hessian = DMatrix::from_fn(n, n, |a, b| {
+                let sum: f64 = moved[a].1.iter().zip(&moved[b].1).map(|(x, y)| x * y).sum();
+                if a == b { sum + NoiseModel::deviation(free[a]).powi(-2) } else { sum }
+            });
+            let gradient = DVector::from_iterator(n, moved.iter().map(|m| m.0));
+            let Some(chol) = hessian.cholesky() else { break };
+            let mut step = chol.solve(&gradient);
+            let longest = step.amax();
+            if longest > LONGEST_SIZE_STEP {
+                step *= LONGEST_SIZE_STEP / longest;
+            }
+            let mut found = None;
+            for _ in 0..3 {
+                let mut logs = fit.logs;
+                free.iter().zip(step.iter()).for_each(|(size, s)| {
+                    logs[*size] = (logs[*size] + s).clamp(-3.0, 3.0);
+                });
+                let (other, _) = self.solve(&fit, &logs, &fit.jumps);
+                let score = self.score(&other, &logs, &fit.jumps);
+                if score > now {
+                    found = Some((logs, other, score));
+                    break;
+                }
+                step *= 0.35;
+            }
+            let Some((logs, solution, score)) = found else {
+                fit = Fit { solution, score: now, ..fit };
+                break;
+            };
+            fit = Fit { logs, solution, score, ..fit };
+            if score - now < 0.05 {
+                break;
+            }
+        }
+        fit
+    }
+
+    /// With the jumps that make it likelier by far.
+    pub(super) fn with_jumps(&self, fit: Fit, most: usize) -> Fit {
+        let mut fit = fit;
+        let frames = self.geometry.frames.len();
+        for _ in 0..most {
+            let (solution, whitened) = self.solve(&fit, &fit.logs, &fit.jumps);
+            let excess = frame_excess(&whitened, &solution.step);
+            // Where three frames together are worst.
+            let sum = |f: usize| excess[f.saturating_sub(1)..(f + 2).min(frames)].iter().sum::<f64>();
+            let Some(worst) = (1..frames).max_by(|a, b| sum(*a).total_cmp(&sum(*b))) else { break };
+            let rows = |f: usize| {
+                whitened.frame_rows[(f + 2).min(frames)] - whitened.frame_rows[f.saturating_sub(1)]
+            };
+            if sum(worst) < EXCESS * (2.0 * rows(worst) as f64).sqrt() {
+                break;
+            }
+            let tries: Vec<Jump> = [(0, 0), (0, 1), (2, 3), (0, 5), (5, 0), (5, 6), (1, 10), (10, 1)]
+                .iter()
+                .map(|(before, after)| Jump {
+                    from: worst.saturating_sub(*before).max(1),
+                    to: (worst + after).min(frames - 1),
+                    m: 0.08,
+                    rad: 1.2_f64.to_radians(),
+                })
+                .chain([Jump {
+                    from: worst.saturating_sub(1).max(1),
+                    to: worst.saturating_sub(1).max(1),
+                    m: 0.08,
+                    rad: 1.2_f64.to_radians(),
+                }])
+                .collect();
+            let best = tries
+                .par_iter()
+                .map(|jump| {
+                    let jumps: Vec<Jump> = fit.jumps.iter().copied().chain([*jump]).collect();
+                    let (solution, _) = self.solve(&fit, &fit.logs, &jumps);
+                    let score = self.score(&solution, &fit.logs, &jumps);
+                    (score, jumps, solution)
+                })
+                .reduce_with(|a, b| if b.0 > a.0 { b } else { a });
+            let Some((score, jumps, solution)) = best else { break };
+            let candidate = self.sized(Fit { jumps, solution, score, ..fit.clone() }, 2);
+            // The cost is in the score already; two more to be worth its name.
+            if candidate.score < fit.score + 2.0 {
+                break;
+            }
+            let gain = candidate.score - fit.score + jump_cost(frames);
+            fit = Fit { jump_gain: fit.jump_gain + gain, ..candidate };
+        }
+        fit
+    }
+}
+
+/// Log likelihood of each frame at a step.
+fn frame_likelihoods(whitened: &Whitened, step: &DVector<f64>) -> Vec<f64> {
+    frame_squares(whitened, step)
+        .into_iter()
+        .zip(&whitened.log_variances)
+        .map(|((squares, _), log)| -0.5 * squares - 0.5 * log)
+        .collect()
+}
+
+/// By how much the squares of a frame exceed their number.
+pub(super) fn frame_excess(whitened: &Whitened, step: &DVector<f64>) -> Vec<f64> {
+    frame_squares(whitened, step).into_iter().map(|(squares, rows)| squares - rows as f64).collect()
+}
+
+fn frame_squares(whitened: &Whitened, step: &DVector<f64>) -> Vec<(f64, usize)> {
+    let width = whitened.width;
+    whitened
+        .frame_rows
+        .windows(2)
+        .map(|w| {
+            let rows = whitened.rows[w[0] * width..w[1] * width].chunks_exact(width);
+            let squares = rows
+                .map(|row| {
+                    let moved: f64 = row[1..].iter().zip(step.iter()).map(|(q, s)| q * s).sum();
+                    (row[0] + moved).powi(2)
+                })
+                .sum();
+            (squares, w[1] - w[0])
+        })
+        .collect()
+}

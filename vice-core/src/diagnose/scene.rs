@@ -1,0 +1,450 @@
+//! The labels of an evaluation as plain arrays, and their residuals as a function of the flaws.
+//!
+//! Equation 1 by the core's own cameras and depth sources. The RMSE_2D that a diagnosis prints is that of the evaluation's
+//! stages; here all segments take part, whichever convention the poses turn out to have, and poses may be smoothed.
+
+use std::collections::{BTreeMap, HashMap};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use nalgebra::{Point3, Vector2, Vector3};
+use rayon::prelude::*;
+
+use super::DiagnoseError;
+use super::flaw::{Flaw, PARAMETERS};
+use super::motion::{Motion, Reader};
+use super::theta::Theta;
+use crate::camera::{Camera, Pixel};
+use crate::dataset::Floor;
+use crate::depth::{DepthSource, Keyframe};
+use crate::evaluate::trial::Trial;
+use crate::evaluate::{EvaluateError, Evaluation};
+use crate::frames::{BodyFromCamera, WorldFromBody, WorldFromCamera};
+use crate::time::Stamp;
+
+/// Where a label's key point is carried minus the label, pixels.
+pub(super) type Residual = Vector2<f64>;
+
+/// What a label costs that cannot be carried at all (behind the camera, no depth), pixels a coordinate.
+pub(super) const LOST_PX: f64 = 400.0;
+/// Answers of a depth source that are kept.
+const KEPT_DEPTHS: usize = 96;
+
+/// A frame with a key frame or a label.
+#[derive(Clone, Debug)]
+pub(super) struct Frame {
+    pub(super) stamp: Stamp,
+    /// Since the camera's first frame.
+    pub(super) t_s: f64,
+    /// Among the camera's frames.
+    pub(super) index: usize,
+    pub(super) body_from_camera: Option<BodyFromCamera>,
+    pub(super) floor: Option<Floor>,
+}
+
+/// A key point and the labels that follow it.
+#[derive(Clone, Debug)]
+pub(super) struct Segment {
+    pub(super) point: usize,
+    pub(super) frame: usize,
+    pub(super) px: Pixel,
+    pub(super) labels: std::ops::Range<usize>,
+}
+
+/// A label that is scored.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Label {
+    pub(super) segment: usize,
+    pub(super) frame: usize,
+    pub(super) px: Pixel,
+}
+
+/// Everything that does not change with the estimate.
+pub(super) struct Scene<'a> {
+    pub(super) camera: &'a Camera,
+    source: &'a dyn DepthSource,
+    pub(super) own_anchor: bool,
+    pub(super) first_frame: Stamp,
+    pub(super) frames: Vec<Frame>,
+    pub(super) segments: Vec<Segment>,
+    pub(super) labels: Vec<Label>,
+    /// The anchor's stream; none where the estimate is its own anchor.
+    anchor: Option<Motion<'a>>,
+    /// Whether each frame has a pose of the anchor.
+    anchored: Vec<bool>,
+    /// Share of a depth that is noise.
+    pub(super) roughness: f64,
+    /// Whether the depth does not depend on where the camera is thought to be.
+    fixed_depth: bool,
+    kept: Mutex<HashMap<Vec<u64>, Arc<Vec<Option<f64>>>>>,
+}
+
+impl<'a> Scene<'a> {
+    pub(super) fn new(
+        evaluation: &'a Evaluation<'a>,
+        stream: usize,
+        depth: usize,
+    ) -> Result<Self, DiagnoseError> {
+        let first_frame = evaluation.frames.first().copied().ok_or(EvaluateError::NoFrames)?;
+        let trial = Trial::new(evaluation);
+        let cameras = trial.cameras().map_err(EvaluateError::Data)?;
+        let anchor_index = evaluation.anchor_of(stream);
+        let own_anchor = anchor_index == stream;
+        let mut frames = Vec::new();
+        let mut at = BTreeMap::new();
+        for (index, body_from_camera) in trial.frame_indices().iter().zip(cameras) {
+            let stamp = evaluation.frames[*index];
+            at.insert(*index, frames.len());
+            let t_s = stamp.since(first_frame).as_secs_f64();
+            frames.push(Frame { stamp, t_s, index: *index, body_from_camera, floor: None });
+        }
+        let (mut segments, mut labels) = (Vec::new(), Vec::new());
+        let mut names: Vec<&str> = Vec::new();
+        for keyframe in evaluation.selection.keyframes() {
+            if names.last() != Some(&keyframe.point) {
+                names.push(keyframe.point);
+            }
+            let Some(frame) = at.get(&keyframe.frame).copied() else { continue };
+            let from = labels.len();
+            for (observation, index) in keyframe.samples() {
+                if let Some(now) = at.get(&index).copied() {
+                    labels.push(Label { segment: segments.len(), frame: now, px: observation.px });
+                }
+            }
+            if labels.len() > from {
+                frames[frame].floor = evaluation.dataset.floor(frames[frame].stamp).ok();
+                let point = names.len() - 1;
+                segments.push(Segment { point, frame, px: keyframe.keyframe.px, labels: from..labels.len() });
+            }
+        }
+        let anchor = &evaluation.streams[anchor_index].trajectory;
+        let anchored = frames.iter().map(|f| anchor.pose_at(f.stamp, evaluation.max_gap).is_ok()).collect();
+        let source = evaluation.depths[depth];
+        let mut scene = Self {
+            camera: evaluation.camera,
+            source,
+            own_anchor,
+            first_frame,
+            frames,
+            segments,
+            labels,
+            anchor: (!own_anchor).then(|| Motion {
+                poses: super::motion::Poses::new(anchor, first_frame),
+                inertial: None,
+                first_frame,
+                id: 0,
+            }),
+            anchored,
+            roughness: source.roughness(),
+            fixed_depth: false,
+            kept: Mutex::default(),
+        };
+        scene.fixed_depth = scene.roughness > 0.0 || scene.depth_is_fixed(evaluation, stream)?;
+        Ok(scene)
+    }
+
+    /// With some labels left out.
+    pub(super) fn only(&mut self, keep: &[bool]) {
+        let (mut segments, mut labels) = (Vec::new(), Vec::new());
+        for segment in &self.segments {
+            let from = labels.len();
+            for i in segment.labels.clone().filter(|i| keep[*i]) {
+                labels.push(Label { segment: segments.len(), ..self.labels[i] });
+            }
+            if labels.len() > from {
+                segments.push(Segment { labels: from..labels.len(), ..segment.clone() });
+            }
+        }
+        (self.segments, self.labels) = (segments, labels);
+        self.kept = Mutex::default();
+    }
+
+    /// Whether a camera turned and moved by a little changes no depth.
+    fn depth_is_fixed(&self, evaluation: &Evaluation<'_>, stream: usize) -> Result<bool, DiagnoseError> {
+        let poses = super::motion::Poses::new(&evaluation.streams[stream].trajectory, self.first_frame);
+        let motion = Motion { poses, inertial: None, first_frame: self.first_frame, id: u64::MAX };
+        let depths = |theta: &Theta| -> Result<Vec<Option<f64>>, DiagnoseError> {
+            let reader = motion.reader(theta).map_err(EvaluateError::Data)?;
+            self.ask(theta, &reader, 4)
+        };
+        let as_is = depths(&Theta::zero())?;
+        let moved = Theta::zero()
+            .with(Flaw::ExtrinsicRotation, &[2e-3, 1e-3, 0.0])
+            .with(Flaw::ExtrinsicTranslation, &[0.01, 0.01, 0.01])
+            .with(Flaw::FocalLength, &[2e-3]);
+        let moved = depths(&moved)?;
+        // Where nothing has depth (poses of another convention look at the sky) nothing is known: it is asked again.
+        let both: Vec<(f64, f64)> =
+            as_is.iter().zip(&moved).filter_map(|(a, b)| Some(((*a)?, (*b)?))).collect();
+        Ok(!both.is_empty() && both.iter().all(|(a, b)| (a - b).abs() <= 1e-9 * a.abs()))
+    }
+
+    /// Residuals with the flaws taken out; `None` where a label cannot be carried.
+    pub(super) fn residuals(
+        &self,
+        theta: &Theta,
+        motion: &Motion<'_>,
+    ) -> Result<Vec<Option<Residual>>, DiagnoseError> {
+        let view = self.view(theta, motion)?;
+        Ok(self.labels.iter().map(|l| view.residual(l)).collect())
+    }
+
+    pub(super) fn view<'s>(
+        &'s self,
+        theta: &Theta,
+        motion: &'s Motion<'_>,
+    ) -> Result<View<'s, 'a>, DiagnoseError> {
+        let refused = |why: String| DiagnoseError::CannotEvaluate(why);
+        let camera = theta.correct_camera(self.camera).map_err(|e| refused(e.to_string()))?;
+        let reader = motion.reader(theta).map_err(|e| refused(e.to_string()))?;
+        let depths = self.depths(theta, &reader, motion)?;
+        let readout_s = theta.of(Flaw::RollingShutter)[0];
+        let at_frames: Vec<WorldFromBody> = self.frames.iter().map(|f| reader.at(f.t_s)).collect();
+        let cameras: Vec<Option<BodyFromCamera>> =
+            self.frames.iter().map(|f| f.body_from_camera.map(|c| theta.correct_extrinsics(&c))).collect();
+        let mut view = View { scene: self, camera, reader, readout_s, at_frames, cameras, points: vec![] };
+        view.points = self
+            .segments
+            .iter()
+            .zip(depths.iter())
+            .map(|(segment, depth)| {
+                let ray = view.camera.unproject(segment.px).ok()?;
+                let camera = view.world_from_camera(segment.frame, segment.px)?;
+                Some(camera.transform_point(&Point3::from(ray * (*depth)?)))
+            })
+            .collect();
+        Ok(view)
+    }
+
+    /// Depths of the segments' key points.
+    fn depths(
+        &self,
+        theta: &Theta,
+        reader: &Reader<'_>,
+        motion: &Motion<'_>,
+    ) -> Result<Arc<Vec<Option<f64>>>, DiagnoseError> {
+        let mut key = Vec::new();
+        let camera_moves = |f: &Flaw| f.of_the_camera() || *f == Flaw::RollingShutter || self.own_anchor;
+        if !self.fixed_depth {
+            for flaw in Flaw::ALL.iter().filter(|f| camera_moves(f)) {
+                key.extend(theta.of(*flaw).iter().map(|v| (v + 0.0).to_bits()));
+            }
+        }
+        if self.own_anchor {
+            key.push(motion.id);
+        }
+        let kept = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(depths) = kept().get(&key) {
+            return Ok(Arc::clone(depths));
+        }
+        let at = if self.fixed_depth { &Theta::zero() } else { theta };
+        let depths = Arc::new(self.ask(at, reader, usize::MAX)?);
+        let mut kept = kept();
+        if kept.len() >= KEPT_DEPTHS {
+            kept.clear();
+        }
+        kept.insert(key, Arc::clone(&depths));
+        Ok(depths)
+    }
+
+    /// Asks the source, for the first key frames at most.
+    fn ask(&self, theta: &Theta, own: &Reader<'_>, most: usize) -> Result<Vec<Option<f64>>, DiagnoseError> {
+        let camera =
+            theta.correct_camera(self.camera).map_err(|e| DiagnoseError::CannotEvaluate(e.to_string()))?;
+        let readout_s = theta.of(Flaw::RollingShutter)[0];
+        let mut by_frame: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (i, segment) in self.segments.iter().enumerate() {
+            by_frame.entry(segment.frame).or_default().push(i);
+        }
+        let anchor = match &self.anchor {
+            Some(anchor) => Some(anchor.reader(&Theta::zero()).map_err(EvaluateError::Data)?),
+            None => None,
+        };
+        let reader = anchor.as_ref().unwrap_or(own);
+        let one =
+            |(frame, segments): (&usize, &Vec<usize>)| -> Result<Vec<(usize, Option<f64>)>, DiagnoseError> {
+                let at = &self.frames[*frame];
+                let (Some(body_from_camera), Some(floor)) = (at.body_from_camera, at.floor) else {
+                    return Ok(vec![]);
+                };
+                let body_from_camera = theta.correct_extrinsics(&body_from_camera);
+                let asked = |t_s: f64, pixels: &[Pixel]| {
+                    let pose = self.anchored[*frame].then(|| reader.at(t_s) * body_from_camera);
+                    let keyframe = Keyframe {
+                        stamp: at.stamp,
+                        frame: at.index,
+                        camera: &camera,
+                        body_from_camera,
+                        world_from_camera: pose,
+                        floor,
+                    };
+                    self.source.depths(&keyframe, pixels).map_err(EvaluateError::Data)
+                };
+                let mut found = Vec::new();
+                if readout_s == 0.0 {
+                    let pixels: Vec<Pixel> = segments.iter().map(|s| self.segments[*s].px).collect();
+                    let depths = asked(at.t_s, &pixels)?;
+                    found.extend(
+                        segments.iter().copied().zip(depths.iter().map(|d| d.as_ref().ok().map(|d| d.z_m))),
+                    );
+                } else {
+                    for s in segments {
+                        let px = self.segments[*s].px;
+                        let depths = asked(at.t_s + readout_s * row_share(&camera, px), &[px])?;
+                        let depth = depths.first().and_then(|d| d.as_ref().ok()).map(|d| d.z_m);
+                        found.push((*s, depth));
+                    }
+                }
+                Ok(found)
+            };
+        let answers: Vec<_> = if self.roughness > 0.0 {
+            by_frame.par_iter().map(one).collect::<Result<_, _>>()?
+        } else {
+            by_frame.iter().take(most).map(one).collect::<Result<Vec<_>, _>>()?
+        };
+        let mut depths = vec![None; self.segments.len()];
+        for (segment, depth) in answers.into_iter().flatten() {
+            depths[segment] = depth.filter(|z| *z > 0.0 && z.is_finite());
+        }
+        Ok(depths)
+    }
+
+    /// Derivatives of the residuals by some parameters, by central differences: one column for each. Labels that cannot
+    /// be carried do not answer.
+    pub(super) fn columns(
+        &self,
+        theta: &Theta,
+        motion: &Motion<'_>,
+        parameters: &[usize],
+    ) -> Result<Vec<Vec<Residual>>, DiagnoseError> {
+        let column = |parameter: &usize| {
+            let step = PARAMETERS[*parameter].step;
+            let at = |sign: f64| {
+                let mut moved = *theta;
+                moved[*parameter] += sign * step;
+                self.residuals(&moved, motion)
+            };
+            let (above, below) = (at(1.0)?, at(-1.0)?);
+            let difference = |(a, b): (&Option<Residual>, &Option<Residual>)| match (a, b) {
+                (Some(a), Some(b)) => (a - b) / (2.0 * step),
+                _ => Residual::zeros(),
+            };
+            Ok(above.iter().zip(&below).map(difference).collect())
+        };
+        match parameters.len() {
+            0..=1 => parameters.iter().map(column).collect(),
+            _ => parameters.par_iter().map(column).collect(),
+        }
+    }
+}
+
+/// When a row is exposed, as a share of the read-out time from the middle row.
+fn row_share(camera: &Camera, px: Pixel) -> f64 {
+    px.v / f64::from(camera.height()) - 0.5
+}
+
+/// The scene as it is with some flaws taken out.
+pub(super) struct View<'s, 'a> {
+    scene: &'s Scene<'a>,
+    camera: Camera,
+    reader: Reader<'s>,
+    readout_s: f64,
+    pub(super) at_frames: Vec<WorldFromBody>,
+    cameras: Vec<Option<BodyFromCamera>>,
+    /// Key points in the world; none without depth.
+    pub(super) points: Vec<Option<Point3<f64>>>,
+}
+
+impl View<'_, '_> {
+    /// The camera when the row of a pixel is exposed.
+    pub(super) fn world_from_camera(&self, frame: usize, px: Pixel) -> Option<WorldFromCamera> {
+        let body_from_camera = self.cameras[frame]?;
+        let body = if self.readout_s == 0.0 {
+            self.at_frames[frame]
+        } else {
+            self.reader.at(self.scene.frames[frame].t_s + self.readout_s * row_share(&self.camera, px))
+        };
+        Some(body * body_from_camera)
+    }
+
+    pub(super) fn extrinsics(&self, frame: usize) -> Option<BodyFromCamera> {
+        self.cameras[frame]
+    }
+
+    pub(super) fn residual(&self, label: &Label) -> Option<Residual> {
+        let point = self.points[label.segment]?;
+        let camera = self.world_from_camera(label.frame, label.px)?;
+        let local = camera.rotation().inverse() * (point.coords - camera.translation());
+        let px = self.camera.project(&Point3::from(local)).ok()?;
+        Some(Vector2::new(px.u - label.px.u, px.v - label.px.v))
+    }
+
+    /// How a label's pixel moves with its point in the world (pixels a metre), and the lever from the body to the point.
+    pub(super) fn answer(&self, label: &Label) -> Option<([Vector3<f64>; 2], Vector3<f64>)> {
+        let point = self.points[label.segment]?;
+        let camera = self.world_from_camera(label.frame, label.px)?;
+        let local = camera.rotation().inverse() * (point.coords - camera.translation());
+        let step = 1e-4 * local.norm().max(1e-3);
+        let mut by_local = [Vector3::zeros(); 2];
+        for axis in 0..3 {
+            let mut at = [local, local];
+            at[0][axis] -= step;
+            at[1][axis] += step;
+            let below = self.camera.project(&Point3::from(at[0])).ok()?;
+            let above = self.camera.project(&Point3::from(at[1])).ok()?;
+            by_local[0][axis] = (above.u - below.u) / (2.0 * step);
+            by_local[1][axis] = (above.v - below.v) / (2.0 * step);
+        }
+        let rotation = camera.rotation();
+        let lever = point.coords - self.at_frames[label.frame].translation();
+        Some((by_local.map(|g| rotation * g), lever))
+    }
+
+    /// Where a key pixel lands in the world with the body moved and turned, the depth asked again where it depends on
+    /// that.
+    pub(super) fn lifted(
+        &self,
+        segment: &Segment,
+        px: Pixel,
+        moved: Vector3<f64>,
+        turned: Vector3<f64>,
+        depth_follows: bool,
+    ) -> Option<Point3<f64>> {
+        let body = self.at_frames[segment.frame];
+        let turn = nalgebra::UnitQuaternion::from_scaled_axis(turned);
+        let body: WorldFromBody =
+            crate::frames::Rigid::from_parts(body.translation() + moved, turn * body.rotation());
+        let body_from_camera = self.cameras[segment.frame]?;
+        let camera = body * body_from_camera;
+        let at = &self.scene.frames[segment.frame];
+        let placed = if self.scene.own_anchor { Some(camera) } else { self.anchor_camera(segment.frame) };
+        let depth = if depth_follows {
+            let keyframe = Keyframe {
+                stamp: at.stamp,
+                frame: at.index,
+                camera: &self.camera,
+                body_from_camera,
+                world_from_camera: placed,
+                floor: at.floor?,
+            };
+            let depths = self.scene.source.depths(&keyframe, &[px]).ok()?;
+            depths.first()?.as_ref().ok()?.z_m
+        } else {
+            let point = self.points[self.scene.labels[segment.labels.start].segment]?;
+            let as_is = self.at_frames[segment.frame] * body_from_camera;
+            (as_is.rotation().inverse() * (point.coords - as_is.translation())).z
+        };
+        let ray = self.camera.unproject(px).ok()?;
+        Some(camera.transform_point(&Point3::from(ray * depth)))
+    }
+
+    fn anchor_camera(&self, frame: usize) -> Option<WorldFromCamera> {
+        let anchor = self.scene.anchor.as_ref()?;
+        let reader = anchor.reader(&Theta::zero()).ok()?;
+        Some(reader.at(self.scene.frames[frame].t_s) * self.cameras[frame]?)
+    }
+
+    /// Whether the depth of a key frame answers to the pose of its body.
+    pub(super) fn depth_follows(&self) -> bool {
+        !self.scene.fixed_depth
+    }
+}

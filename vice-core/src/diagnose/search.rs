@@ -1,0 +1,311 @@
+//! All hypotheses: none, each flaw, pairs; fitted to the same labels with the same outliers, by their evidence.
+
+use rayon::prelude::*;
+
+use super::DiagnoseError;
+use super::filter::Weights;
+use super::fit::{Fit, Normal, Work, expected_of, parameters_of};
+use super::flaw::Flaw;
+use super::gross::independent;
+use super::noise::Logs;
+use super::outliers;
+use super::starts::{robust_cost, start};
+use super::theta::Theta;
+
+/// Sizes are estimated for hypotheses this close to the best one, as a logarithm.
+const CLOSE: f64 = 60.0;
+/// Jumps are looked for in hypotheses this close.
+const CLOSE_FOR_JUMPS: f64 = 40.0;
+/// Pairs this close to the best hypothesis are fitted in full, and at most so many.
+const CLOSE_PAIR: f64 = 12.0;
+const MOST_PAIRS: usize = 5;
+/// A flaw more must be nearer by this, as a logarithm of a robust likelihood.
+const NEARER: f64 = 1.5;
+/// Prior of no flaw, of one, of two.
+const NONE: f64 = 0.35;
+const ONE: f64 = 0.5;
+const TWO: f64 = 0.15;
+/// At most so many jumps.
+const MOST_JUMPS: usize = 3;
+
+/// A hypothesis and how likely it is beside the others.
+pub(super) struct Ranked {
+    pub(super) fit: Fit,
+    /// Evidence and prior, as a logarithm.
+    pub(super) log_posterior: f64,
+    /// Share of all hypotheses.
+    pub(super) posterior: f64,
+}
+
+/// What was found.
+pub(super) struct Search {
+    /// All of them, the likeliest first.
+    pub(super) ranked: Vec<Ranked>,
+    /// Flaws that cannot be evaluated.
+    pub(super) refused: Vec<(Flaw, String)>,
+}
+
+/// Likelihood of a set of flaws before anything is seen, as a logarithm.
+fn log_prior(flaws: &[Flaw], all: &[Flaw]) -> f64 {
+    let weight = |f: &Flaw| if f.is_common() { 1.0 } else { 0.5 };
+    let total: f64 = all.iter().map(weight).sum();
+    let share = |f: &Flaw| weight(f) / total;
+    match flaws {
+        [] => NONE.ln(),
+        [one] => (ONE * share(one)).ln(),
+        // Either may be named first.
+        [a, b] => (TWO * 2.0 * share(a) * share(b)).ln(),
+        _ => 1e-4_f64.ln(),
+    }
+}
+
+/// Fits all of them. `progress` is called with (done, total).
+pub(super) fn search(
+    work: &mut Work<'_, '_>,
+    flaws: &[Flaw],
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Search, DiagnoseError> {
+    let zero = Theta::zero();
+    let logs: Logs = [0.0; 6];
+    let base = work.residuals(&zero)?;
+    work.weights = outliers::by_neighbours(work, &base);
+    let steps = 6;
+    progress(0, steps);
+    let (mut fits, refused) = singles(work, flaws, &logs)?;
+    // How pixels move with a pose is taken where the labels fit best, and not where nothing does.
+    let nearest = nearest(&fits, work.scene.labels.len()).clone();
+    if !nearest.flaws.is_empty() {
+        move_to(work, &nearest.values())?;
+        fits = again(work, fits, 3);
+    }
+    progress(1, steps);
+    let second = pairs(work, &fits, flaws, 3, false);
+    fits.extend(second);
+    let nearest = self::nearest(&fits, work.scene.labels.len()).clone();
+    if nearest.flaws.len() == 2 {
+        move_to(work, &nearest.values())?;
+        fits = again(work, fits, 1);
+    }
+    progress(2, steps);
+    work.weights = shared_outliers(work, &fits, &nearest.flaws);
+    fits = again(work, fits, 2);
+    fits = same_sizes(work, fits);
+    progress(3, steps);
+    // Once more, now that the noise is known.
+    let best = best_of(&fits);
+    work.weights = outliers::find(work, &fits[best]);
+    fits.retain(|f| f.flaws.len() < 2);
+    fits = again(work, fits, 1);
+    fits = sized(work, fits);
+    let close = best_score(&fits) - CLOSE_FOR_JUMPS;
+    fits = fits
+        .into_par_iter()
+        .map(|fit| if fit.score > close { work.with_jumps(fit, MOST_JUMPS) } else { fit })
+        .collect();
+    progress(4, steps);
+    let pairs = pairs(work, &fits, flaws, MOST_PAIRS, true);
+    fits.extend(pairs);
+    progress(steps, steps);
+    let mut ranked: Vec<Ranked> = fits
+        .into_iter()
+        .map(|fit| Ranked { log_posterior: fit.score + log_prior(&fit.flaws, flaws), fit, posterior: 0.0 })
+        .collect();
+    ranked.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
+    let most = ranked[0].log_posterior;
+    let sum: f64 = ranked.iter().map(|r| (r.log_posterior - most).exp()).sum();
+    ranked.iter_mut().for_each(|r| r.posterior = (r.log_posterior - most).exp() / sum);
+    Ok(Search { ranked, refused })
+}
+
+fn best_of(fits: &[Fit]) -> usize {
+    (0..fits.len()).max_by(|a, b| fits[*a].score.total_cmp(&fits[*b].score)).unwrap_or(0)
+}
+
+fn best_score(fits: &[Fit]) -> f64 {
+    fits.iter().map(|f| f.score).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// No flaw and each alone, from the best of many starts.
+fn singles(
+    work: &Work<'_, '_>,
+    flaws: &[Flaw],
+    logs: &Logs,
+) -> Result<(Vec<Fit>, Vec<(Flaw, String)>), DiagnoseError> {
+    let zero = Theta::zero();
+    let sets: Vec<Vec<Flaw>> = std::iter::once(vec![]).chain(flaws.iter().map(|f| vec![*f])).collect();
+    let first: Vec<Result<Fit, DiagnoseError>> = sets
+        .par_iter()
+        .map(|set| {
+            let from = set.first().map_or(zero, |flaw| start(work, *flaw, &zero));
+            work.newton(set, &from, logs, &[], 4)
+        })
+        .collect();
+    let (mut fits, mut refused) = (Vec::new(), Vec::new());
+    for (set, fit) in sets.iter().zip(first) {
+        match (fit, set.first()) {
+            (Ok(fit), _) => fits.push(fit),
+            (Err(DiagnoseError::CannotEvaluate(why)), Some(flaw)) => refused.push((*flaw, why)),
+            (Err(error), _) => return Err(error),
+        }
+    }
+    Ok((fits, refused))
+}
+
+/// The fit that leaves least by a robust measure; no flaw unless one is clearly better, one flaw unless two are.
+fn nearest(fits: &[Fit], labels: usize) -> &Fit {
+    let cost =
+        |fit: &Fit| robust_cost(&fit.residuals_now()) * independent(labels) + NEARER * fit.flaws.len() as f64;
+    let mut best = &fits[0];
+    for fit in fits {
+        if cost(fit) < cost(best) {
+            best = fit;
+        }
+    }
+    best
+}
+
+/// Takes the geometry at other values, and outliers by neighbours there.
+fn move_to(work: &mut Work<'_, '_>, theta: &Theta) -> Result<(), DiagnoseError> {
+    if let Ok(moved) = Work::new(work.scene, work.motion, work.noise, theta) {
+        *work = moved;
+        let residuals = work.residuals(theta)?;
+        work.weights = outliers::by_neighbours(work, &residuals);
+    }
+    Ok(())
+}
+
+/// All hypotheses must get the same outliers: those of the likelier of two bases, the nearest fit and no flaw with jumps.
+fn shared_outliers(work: &Work<'_, '_>, fits: &[Fit], nearest: &[Flaw]) -> Weights {
+    let nearest = fits.iter().find(|f| f.flaws == nearest);
+    let none = fits.iter().find(|f| f.flaws.is_empty());
+    let bases: Vec<Fit> = nearest.into_iter().chain(none).cloned().collect();
+    let tried: Vec<(f64, Weights)> = bases
+        .into_par_iter()
+        .map(|base| {
+            let mut own = work.same();
+            let base = own.sized(base, 2);
+            let base = if base.flaws.is_empty() { own.with_jumps(base, 2) } else { base };
+            own.weights = outliers::find(&own, &base);
+            let base = own.sized(base, 1);
+            (base.score, own.weights)
+        })
+        .collect();
+    let found = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+    found.map_or_else(|| work.weights.clone(), |(_, weights)| weights)
+}
+
+/// Fits them again from where they are, with the outliers as they are now.
+fn again(work: &Work<'_, '_>, fits: Vec<Fit>, steps: usize) -> Vec<Fit> {
+    let close = best_score(&fits) - 20.0 * CLOSE;
+    fits.into_par_iter()
+        .map(|fit| {
+            if fit.score < close {
+                return fit;
+            }
+            let from = fit.values();
+            match work.newton(&fit.flaws, &from, &fit.logs, &fit.jumps, steps) {
+                Ok(new) => Fit { jump_gain: fit.jump_gain, ..new },
+                Err(_) => fit,
+            }
+        })
+        .collect()
+}
+
+/// All of them with the sizes of the best one.
+fn same_sizes(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
+    let best = best_of(&fits);
+    let logs = work.sized(fits[best].clone(), 3).logs;
+    fits.into_par_iter().map(|fit| work.rescored(Fit { logs, ..fit })).collect()
+}
+
+/// With their own sizes, those that are close.
+fn sized(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
+    let best = best_of(&fits);
+    let first = work.sized(fits[best].clone(), 2);
+    let limit = first.score - CLOSE;
+    let fits: Vec<Fit> = fits
+        .into_par_iter()
+        .enumerate()
+        .map(|(i, fit)| match i == best {
+            true => first.clone(),
+            // Far from the best the best one's sizes are far from right.
+            false if fit.score > limit - 3.0 * CLOSE => work.sized(fit, 1),
+            false => fit,
+        })
+        .collect();
+    let limit = best_score(&fits) - CLOSE;
+    fits.into_par_iter().map(|fit| if fit.score > limit { work.sized(fit, 1) } else { fit }).collect()
+}
+
+/// The second flaws that matter, beside the three best.
+fn pairs(work: &Work<'_, '_>, fits: &[Fit], flaws: &[Flaw], most_pairs: usize, in_full: bool) -> Vec<Fit> {
+    let mut order: Vec<usize> = (0..fits.len()).filter(|i| fits[*i].flaws.len() == 1).collect();
+    order.sort_by(|a, b| fits[*b].score.total_cmp(&fits[*a].score));
+    let best = best_score(fits);
+    let looked: Vec<(f64, Vec<Flaw>, usize)> = order
+        .into_iter()
+        .take(3)
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .flat_map(|i| {
+            second_flaws(work, &fits[i], flaws).into_iter().map(|(s, set)| (s, set, i)).collect::<Vec<_>>()
+        })
+        .collect();
+    let mut looked = looked;
+    looked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut chosen: Vec<(Vec<Flaw>, usize)> = Vec::new();
+    let most = looked.first().map_or(best, |l| l.0.max(best));
+    for (score, set, i) in looked {
+        let mut sorted = set.clone();
+        sorted.sort_unstable();
+        let known = chosen.iter().any(|(other, _)| {
+            let mut other = other.clone();
+            other.sort_unstable();
+            other == sorted
+        });
+        if score > most - CLOSE_PAIR && !known && chosen.len() < most_pairs {
+            chosen.push((set, i));
+        }
+    }
+    chosen
+        .into_par_iter()
+        .filter_map(|(set, i)| {
+            let of = &fits[i];
+            let fit = work.newton(&set, &of.values(), &of.logs, &[], 3).ok()?;
+            if !in_full {
+                return Some(fit);
+            }
+            let fit = work.sized(fit, 2);
+            Some(work.with_jumps(fit, MOST_JUMPS))
+        })
+        .collect()
+}
+
+/// Each second flaw beside a fit, by columns of one pass: how likely the pair is at least.
+fn second_flaws(work: &Work<'_, '_>, fit: &Fit, flaws: &[Flaw]) -> Vec<(f64, Vec<Flaw>)> {
+    let others: Vec<Flaw> =
+        flaws.iter().copied().filter(|f| !fit.flaws.contains(f) && *f != Flaw::ClockStep).collect();
+    let added = parameters_of(&others);
+    let theta = fit.theta;
+    let Ok(columns) = work.scene.columns(&theta, work.motion, &added) else { return vec![] };
+    let mut all = fit.columns.clone();
+    all.extend(columns);
+    let whitened = work.whiten(&fit.residuals, &all, &fit.logs, &fit.jumps);
+    let own: Vec<usize> = (1..=fit.parameters.len()).collect();
+    others
+        .into_iter()
+        .map(|flaw| {
+            let parameters: Vec<usize> = fit.parameters.iter().copied().chain(flaw.solved()).collect();
+            let second = added
+                .iter()
+                .enumerate()
+                .filter(|(_, p)| flaw.solved().contains(p))
+                .map(|(i, _)| 1 + fit.parameters.len() + i);
+            let columns: Vec<usize> = own.iter().copied().chain(second).collect();
+            let values: Vec<f64> = parameters.iter().map(|p| theta[*p]).collect();
+            let solution = Normal::of(&whitened, &columns).solve(&values, &expected_of(&parameters));
+            let set: Vec<Flaw> = fit.flaws.iter().copied().chain([flaw]).collect();
+            (fit.score - fit.solution.evidence + solution.evidence, set)
+        })
+        .collect()
+}

@@ -1,0 +1,92 @@
+//! Where fits begin: a wrong clock is a valley of its own, so that many values are looked at first. No grid is left in
+//! the answer: it only says where Gauss-Newton starts.
+
+use super::fit::Work;
+use super::flaw::Flaw;
+use super::scene::Residual;
+use super::theta::Theta;
+
+/// Errors beyond this count less and less, pixels.
+const ROBUST_PX: f64 = 3.0;
+
+/// Mean of `log(1 + |r|² / (3 px)²)`.
+pub(super) fn robust_cost(residuals: &[Residual]) -> f64 {
+    let sum: f64 = residuals.iter().map(|r| (r.norm_squared() / (ROBUST_PX * ROBUST_PX)).ln_1p()).sum();
+    sum / residuals.len().max(1) as f64
+}
+
+/// Offsets that are looked at, seconds, both ways.
+const OFFSETS_S: [f64; 14] =
+    [0.005, 0.01, 0.02, 0.03, 0.045, 0.065, 0.09, 0.13, 0.18, 0.25, 0.35, 0.5, 0.8, 1.2];
+const RATES: [f64; 9] = [5e-4, 2e-3, 5e-3, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5];
+const STEPS_S: [f64; 4] = [0.03, 0.08, 0.15, 0.4];
+const STEP_TIMES: usize = 12;
+const SINKS_M_S: [f64; 5] = [0.01, 0.03, 0.06, 0.12, 0.25];
+
+/// The best start of a flaw beside other values; those values where nothing is better.
+pub(super) fn start(work: &Work<'_, '_>, flaw: Flaw, beside: &Theta) -> Theta {
+    let cost = |theta: &Theta| work.residuals(theta).map_or(f64::INFINITY, |r| robust_cost(&r));
+    let mut best = (cost(beside), *beside);
+    let try_it = |theta: Theta, best: &mut (f64, Theta)| {
+        let cost = cost(&theta);
+        if cost < best.0 {
+            *best = (cost, theta);
+        }
+    };
+    let both = |sizes: &[f64]| -> Vec<f64> { sizes.iter().flat_map(|s| [*s, -*s]).collect() };
+    match flaw {
+        Flaw::ClockOffset | Flaw::ClockRate => {
+            let sizes = if flaw == Flaw::ClockOffset { both(&OFFSETS_S) } else { both(&RATES) };
+            let index = flaw.parameters().start;
+            for size in sizes {
+                let mut theta = *beside;
+                theta[index] += size;
+                try_it(theta, &mut best);
+            }
+            // Between the neighbours of the best one.
+            for share in [0.8, 0.9, 1.1, 1.25] {
+                let mut theta = best.1;
+                theta[index] = beside[index] + share * (best.1[index] - beside[index]);
+                try_it(theta, &mut best);
+            }
+        }
+        Flaw::ClockStep => {
+            let (first, last) = span(work);
+            for i in 1..=STEP_TIMES {
+                let at = first + (last - first) * (i as f64) / (STEP_TIMES + 1) as f64;
+                for size in both(&STEPS_S) {
+                    try_it(beside.with(Flaw::ClockStep, &[size, at]), &mut best);
+                }
+            }
+            if best.1 == *beside {
+                let middle = 0.5 * (first + last);
+                return beside.with(Flaw::ClockStep, &[0.0, middle]);
+            }
+            let mut width = (last - first) / (STEP_TIMES + 1) as f64;
+            while width > 0.04 {
+                width *= 0.5;
+                for sign in [-1.0, 1.0] {
+                    let [size, at] = [best.1.of(flaw)[0], best.1.of(flaw)[1]];
+                    try_it(beside.with(flaw, &[size, at + sign * width]), &mut best);
+                    try_it(beside.with(flaw, &[size * (1.0 + 0.2 * sign), at]), &mut best);
+                }
+            }
+        }
+        Flaw::Drift if work.scene.own_anchor => {
+            let up = flaw.parameters().start + 2;
+            for size in both(&SINKS_M_S) {
+                let mut theta = *beside;
+                theta[up] += size;
+                try_it(theta, &mut best);
+            }
+        }
+        _ => {}
+    }
+    best.1
+}
+
+/// First and last frame, seconds.
+pub(super) fn span(work: &Work<'_, '_>) -> (f64, f64) {
+    let frames = &work.scene.frames;
+    (frames.first().map_or(0.0, |f| f.t_s), frames.last().map_or(0.0, |f| f.t_s))
+}
