@@ -12,6 +12,7 @@ use vice_run::core::error::{DataError, ErrorKind};
 use vice_run::core::suspicion::Suspicion;
 use vice_run::error::RunError;
 pub(crate) use vice_run::text::printable;
+use vice_run::text::with_options;
 
 /// How a command ended that did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -202,56 +203,6 @@ fn one(error: &(dyn std::error::Error + 'static)) -> String {
         None => error.to_string(),
     }
 }
-
-/// Names of fields in back quotes as options: `max-gap` as --max-gap.
-pub(crate) fn with_options(hint: &str) -> String {
-    let mut text = String::new();
-    for (index, part) in hint.split('`').enumerate() {
-        let is_field = index % 2 == 1 && FIELDS.contains(&part);
-        match (index % 2, is_field) {
-            (1, true) => text.push_str(&format!("--{part}")),
-            (1, false) => text.push_str(&format!("`{part}`")),
-            _ => text.push_str(part),
-        }
-    }
-    text
-}
-
-/// Fields that have an option of the same name.
-const FIELDS: [&str; 32] = [
-    "add",
-    "align",
-    "allow-writable-plugin",
-    "anchor",
-    "at",
-    "calibration",
-    "camera",
-    "chessboard",
-    "cloud-voxel",
-    "depth",
-    "depth-check",
-    "duration",
-    "estimate",
-    "estimate-as",
-    "estimate-frame",
-    "floor-plane",
-    "force",
-    "format",
-    "initial-pose",
-    "interpolate",
-    "labels",
-    "max-gap",
-    "observations",
-    "plugin",
-    "points",
-    "port",
-    "reference",
-    "set",
-    "start",
-    "tag-size",
-    "time-offset",
-    "zmap-occlusion",
-];
 
 /// The exit code of an error: 2 where the request makes no sense, else 1.
 pub(crate) fn exit_code(error: &anyhow::Error) -> u8 {

@@ -52,7 +52,6 @@ impl Seen {
         let Some(doubt) = doubt else { return };
         if self.said.iter().all(|s| s.code != doubt.code) {
             let doubt = Suspicion { about: format!("depth of camera {camera}"), ..doubt };
-            tracing::warn!("{}", doubt.line());
             self.said.add(doubt);
         }
     }

@@ -52,6 +52,7 @@ impl Conversion {
         } else {
             dataset.trajectory(&name)?
         };
+        leniency::log(&dataset.suspicions().into_iter().collect());
         let frames = camera.as_ref().map(|camera| dataset.frames(camera)).transpose()?;
         let extrinsics = |stamp: Stamp| dataset.body_from_camera(camera.as_ref()?, stamp).ok();
         let first_frame = frames.and_then(|frames| frames.first().copied());

@@ -5,6 +5,7 @@ use vice_core::camera::Pixel;
 use vice_core::depth::{DepthMiss, DepthSample, DepthSource};
 use vice_core::evaluate::{SelectedKeyframe, Selection};
 use vice_core::frames::WorldFromCamera;
+use vice_core::suspicion::Suspicions;
 use vice_core::time::Stamp;
 use vice_core::track::{lift, track};
 
@@ -21,6 +22,9 @@ pub struct DepthComparison {
     pub schema: &'static str,
     /// Names of the sources.
     pub sources: Vec<String>,
+    /// What looks wrong in the data.
+    #[serde(skip_serializing_if = "Suspicions::is_empty")]
+    pub suspicions: Suspicions,
     /// The labelled key points.
     pub key_points: Vec<KeyPoint>,
 }
@@ -72,15 +76,16 @@ pub fn compare_depths(request: &Request) -> RunResult<DepthComparison> {
     }
     let scene = Scene::open(&request.dataset, &request.streams.reference, request.streams.max_gap)?;
     let opened = &scene.opened;
-    let (labels, suspicions) = request.labels.read(&opened.frames)?;
-    vice_files::leniency::log(&suspicions);
+    let (labels, mut suspicions) = request.labels.read(opened)?;
     let sources = request.depth.make_all(opened)?;
     let selection = Selection::new(&labels, &opened.frames, &opened.camera, &request.window())
         .context(|| request.labels.file.display().to_string())?;
     let key_points: Vec<KeyPoint> =
         selection.keyframes().map(|k| key_point(&scene, &sources, &k)).collect::<RunResult<_>>()?;
+    suspicions.extend(opened.dataset.suspicions().into_iter().chain(opened.suspicions()));
+    suspicions.extend(sources.iter().flat_map(|source| source.suspicions()));
     let sources = sources.iter().map(|s| s.name().to_string()).collect();
-    Ok(DepthComparison { schema: "vice.depth-compare/1", sources, key_points })
+    Ok(DepthComparison { schema: "vice.depth-compare/1", sources, key_points, suspicions })
 }
 
 fn key_point(

@@ -2,6 +2,7 @@
 
 use vice_core::dataset::DepthImage;
 use vice_core::depth::DepthMiss;
+use vice_core::suspicion::Suspicions;
 use vice_depth::{DepthMap, depth_image};
 use vice_files::image_file::{encode_depth_png, encode_png};
 
@@ -18,6 +19,8 @@ pub struct DepthImages {
     pub files: Vec<(String, Vec<u8>)>,
     /// The table.
     pub text: String,
+    /// What looks wrong in the data.
+    pub suspicions: Suspicions,
 }
 
 /// Asks each source for each pixel of a frame.
@@ -79,7 +82,9 @@ pub fn depth_images(
         // The depth does not need it: a film without a decoder still has its floor.
         Err(error) => tracing::warn!("the image beside the depth is left out: {error}"),
     }
-    Ok(DepthImages { files, text })
+    let mut suspicions: Suspicions = opened.dataset.suspicions().into_iter().collect();
+    suspicions.extend(sources.iter().flat_map(|source| source.suspicions()));
+    Ok(DepthImages { files, text, suspicions })
 }
 
 /// A 16-bit PNG in millimetres, which ends at 65.535 m: what is further has no depth there, and is said.

@@ -9,6 +9,7 @@ use vice_core::error::ErrorKind;
 use vice_core::evaluate::Evaluation;
 use vice_core::frames::BodyFromCamera;
 use vice_core::result::Role;
+use vice_core::suspicion::Suspicions;
 use vice_core::time::{Span, Stamp};
 use vice_files::calibration::{CalibrationFile, CameraOverride};
 
@@ -63,6 +64,14 @@ pub struct Answer {
     pub outcome: RunResult<(DiagnosisResult, RunResult<CalibrationFile>)>,
 }
 
+/// The answers, and what looked wrong on the way to them.
+pub struct Answers {
+    /// One for each estimate with each depth source.
+    pub list: Vec<Answer>,
+    /// What looks wrong in the data.
+    pub suspicions: Suspicions,
+}
+
 /// Diagnoses each estimate with each depth source. One that fails does not take the others with it.
 ///
 /// # Errors
@@ -72,7 +81,7 @@ pub fn diagnose_all(
     opened: &Opened,
     looking: &Looking,
     progress: &Progress<'_>,
-) -> RunResult<Vec<Answer>> {
+) -> RunResult<Answers> {
     let flaws = looking.flaws();
     request.with_evaluation(opened, false, |evaluation, streams| {
         let mut answers = Vec::new();
@@ -97,8 +106,16 @@ pub fn diagnose_all(
                 answers.push(Answer { stream: names.0, depth: names.1, outcome });
             }
         }
-        Ok(answers)
+        Ok(Answers { list: answers, suspicions: suspicions(evaluation, streams) })
     })
+}
+
+/// What was doubted of the data, the depths and the streams.
+fn suspicions(evaluation: &Evaluation<'_>, streams: &LoadedStreams) -> Suspicions {
+    let mut list: Suspicions = evaluation.dataset.suspicions().into_iter().collect();
+    list.extend(evaluation.depths.iter().flat_map(|source| source.suspicions()));
+    list.extend(streams.suspicions.clone());
+    list
 }
 
 /// How RMSE_2D of one estimate with one depth source answers to each flaw.
@@ -110,7 +127,7 @@ pub fn sensitivity_of(
     opened: &Opened,
     looking: &Looking,
     progress: &Progress<'_>,
-) -> RunResult<SensitivityDocument> {
+) -> RunResult<(SensitivityDocument, Suspicions)> {
     let flaws = looking.flaws();
     request.with_evaluation(opened, false, |evaluation, streams| {
         let estimates = estimates(evaluation);
@@ -120,7 +137,8 @@ pub fn sensitivity_of(
         let inertial = streams.inertial_run(*stream);
         let options = looking.options();
         let diagnosis = Diagnosis { evaluation, stream: *stream, depth: 0, inertial, flaws: &flaws, options };
-        Ok(sensitivity(&diagnosis, &|done, total| progress("injecting", done, total))?)
+        let document = sensitivity(&diagnosis, &|done, total| progress("injecting", done, total))?;
+        Ok((document, suspicions(evaluation, streams)))
     })
 }
 

@@ -4,7 +4,6 @@ use vice_core::depth::DepthSource;
 use vice_core::evaluate::{EvaluateError, Evaluation, SampleSink, Selection, evaluate, evaluate_streaming};
 use vice_core::label::LabelSet;
 use vice_core::suspicion::Suspicions;
-use vice_core::time::Stamp;
 
 use crate::error::{Context, RunError, RunResult};
 use crate::open::Opened;
@@ -41,11 +40,12 @@ impl LabelsSpec {
     ///
     /// # Errors
     /// [`RunError`] if the file cannot be read, or has not the points that are asked for.
-    pub fn read(&self, frames: &[Stamp]) -> RunResult<(LabelSet, Suspicions)> {
+    pub fn read(&self, opened: &Opened) -> RunResult<(LabelSet, Suspicions)> {
         if self.file.as_os_str().is_empty() {
             return Err(RunError::usage("labels", "no file of labels is named"));
         }
-        let file = vice_files::labels::read_file(&self.file, Some(frames))?;
+        let file = vice_files::labels::read_file(&self.file, Some(&opened.frames))?;
+        file.check_image_size(opened.camera.width(), opened.camera.height()).map_err(|e| e.at(&self.file))?;
         let labels = file.labels;
         tracing::info!("{} points with {} labels", labels.points().len(), labels.observation_count());
         if self.points.is_empty() {
@@ -114,7 +114,7 @@ impl Request {
         keep_samples: bool,
         work: impl FnOnce(&Evaluation<'_>, &LoadedStreams) -> RunResult<T>,
     ) -> RunResult<T> {
-        let (labels, in_labels_file) = self.labels.read(&opened.frames)?;
+        let (labels, in_labels_file) = self.labels.read(opened)?;
         let in_labels = |error: EvaluateError| match error {
             EvaluateError::Data(error) => RunError::from(error),
             error => match Err::<(), _>(error).context(|| self.labels.file.display().to_string()) {

@@ -19,6 +19,57 @@ pub fn shell_word(word: &str) -> String {
     }
 }
 
+/// Names of fields in back quotes as options: `max-gap` as --max-gap.
+pub fn with_options(hint: &str) -> String {
+    let mut text = String::new();
+    for (index, part) in hint.split('`').enumerate() {
+        let is_field = index % 2 == 1 && FIELDS.contains(&part);
+        match (index % 2, is_field) {
+            (1, true) => text.push_str(&format!("--{part}")),
+            (1, false) => text.push_str(&format!("`{part}`")),
+            _ => text.push_str(part),
+        }
+    }
+    text
+}
+
+/// Fields that have an option of the same name.
+const FIELDS: [&str; 33] = [
+    "add",
+    "align",
+    "allow-writable-plugin",
+    "anchor",
+    "at",
+    "calibration",
+    "camera",
+    "chessboard",
+    "cloud-voxel",
+    "depth",
+    "depth-check",
+    "duration",
+    "estimate",
+    "estimate-as",
+    "estimate-frame",
+    "floor-plane",
+    "force",
+    "format",
+    "initial-pose",
+    "interpolate",
+    "labels",
+    "max-gap",
+    "mend",
+    "observations",
+    "plugin",
+    "points",
+    "port",
+    "reference",
+    "set",
+    "start",
+    "tag-size",
+    "time-offset",
+    "zmap-occlusion",
+];
+
 #[cfg(test)]
 mod tests {
     use super::*;

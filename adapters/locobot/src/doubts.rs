@@ -30,7 +30,6 @@ impl Doubts {
         let is_known =
             |s: &Suspicion| s.code == doubt.code && s.about == doubt.about && s.message == doubt.message;
         if !known.iter().any(is_known) {
-            tracing::warn!("{}", doubt.line());
             known.add(doubt);
         }
     }

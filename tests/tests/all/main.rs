@@ -13,6 +13,7 @@ mod bad_input;
 mod batch;
 mod blackbird_oracle;
 mod camera_oracle;
+mod cases;
 mod commands;
 mod depth_oracle;
 mod detect;

@@ -96,6 +96,7 @@ fn write_images(args: &ImageArgs, verbosity: Verbosity) -> anyhow::Result<Outcom
     let reference = args.anchor.reference();
     let scene = Scene::open(&args.depth.dataset(&args.dataset), &reference, args.anchor.max_gap)?;
     let made = with_progress(verbosity, |progress| depth_images(&scene, &depth, &args.at, progress))?;
+    terminal::warn(made.suspicions.iter());
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
     for (name, bytes) in &made.files {

@@ -45,6 +45,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     };
     let outputs = Outputs::new(&[&args.json], &request.inputs())?;
     let comparison = compare_depths(&request)?;
+    terminal::warn(comparison.suspicions.iter());
     let json = args.json.as_ref().map(|path| anyhow::Ok((path, to_json(&comparison)?)));
     if !outputs.write(&json.into_iter().collect::<anyhow::Result<Vec<_>>>()?)? {
         terminal::print(&render(&comparison))?;

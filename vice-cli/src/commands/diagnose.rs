@@ -68,6 +68,8 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     let opened = request.open()?;
     let looking = args.looking.spec();
     let answers = with_progress(verbosity, |progress| diagnose_all(&request, &opened, &looking, progress))?;
+    terminal::warn(answers.suspicions.iter());
+    let answers = answers.list;
     if answers.len() > 1 && (args.json.is_some() || args.apply.is_some()) {
         return Err(usage("--json and --apply take one --estimate and one --depth"));
     }

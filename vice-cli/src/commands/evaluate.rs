@@ -125,7 +125,6 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         None if keep => request.evaluate(&opened, Samples::Keep, progress),
         None => request.evaluate(&opened, Samples::Drop, progress),
     })?;
-    terminal::warn(document.suspicions.iter());
     let page = match &files.report {
         Some(path) => {
             let shots = shots(&document, dataset, IMAGE_BUDGET_BYTES, verbosity);
@@ -148,6 +147,9 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     let json_printed = files.json.as_ref().map_or(Ok(false), |path| outputs.write_json(path, &document))?;
     if !(outputs.write(&texts)? || json_printed) {
         terminal::print(&report::table::render(&document))?;
+    } else {
+        // The table has them in it.
+        terminal::warn(document.suspicions.iter());
     }
     let skips = judge_skips(&document, args.scoring.max_skipped, verbosity);
     let broken = broken(&args.scoring.require, &document.pixel);

@@ -39,8 +39,9 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     let outputs = Outputs::new(&[&args.json, &args.csv, &args.svg], &request.inputs())?;
     let opened = request.open()?;
     let looking = args.looking.spec();
-    let document =
+    let (document, suspicions) =
         with_progress(verbosity, |progress| sensitivity_of(&request, &opened, &looking, progress))?;
+    terminal::warn(suspicions.iter());
     let mut texts = Vec::new();
     if let Some(path) = &args.json {
         texts.push((path, to_json(&document)?));

@@ -114,9 +114,6 @@ impl Cloud {
                     .advice("is the scan in millimetres?"),
             );
         }
-        for suspicion in suspicions.iter() {
-            tracing::warn!("{}", suspicion.line());
-        }
         Self { points, origin_m: origin_m.into(), tree, suspicions }
     }
 

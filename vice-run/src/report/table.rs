@@ -1,10 +1,12 @@
 //! The table on the terminal, in the shape of the paper's, and what was left out.
 
+use vice_core::suspicion::Suspicion;
+
 use crate::result::ResultDocument;
 
 use super::held::{self, filled, window_name, windows};
 use super::rows::{mean_and_deviation, pixels, rows, sizes};
-use crate::text::printable;
+use crate::text::{printable, with_options};
 
 /// The table, the pooled RMSE of each stream, and the skips.
 pub fn render(document: &ResultDocument) -> String {
@@ -51,7 +53,17 @@ pub fn render(document: &ResultDocument) -> String {
     text.push_str(&pooled(document));
     text.push_str(&held_labels(document));
     text.push_str(&by_age(document));
+    text.push_str(&suspicions(document));
     text
+}
+
+/// What looks wrong in the data, and what to do about it.
+fn suspicions(document: &ResultDocument) -> String {
+    if document.suspicions.is_empty() {
+        return String::new();
+    }
+    let line = |s: &Suspicion| format!("- {}\n", printable(&with_options(&s.line())));
+    format!("\nwhat looks wrong\n{}", document.suspicions.iter().map(line).collect::<String>())
 }
 
 /// The error of the labels that hold, with its interval.

@@ -8,7 +8,7 @@ use vice_core::result::{PixelPart, Role};
 
 use crate::report::held;
 use crate::report::rows::{mean_and_deviation, pixels, rows, sizes};
-use crate::text::printable;
+use crate::text::{printable, with_options};
 
 const NOT_AVAILABLE: &str = "–";
 
@@ -122,7 +122,7 @@ fn held_row(part: &PixelPart, names: &[String]) -> Markup {
 /// What looks wrong but did not stop the evaluation.
 pub(crate) fn doubts(document: &ResultDocument) -> Markup {
     html! {
-        @for suspicion in document.suspicions.iter() { p.warn { (printable(&suspicion.line())) } }
+        @for suspicion in document.suspicions.iter() { p.warn { (printable(&with_options(&suspicion.line()))) } }
     }
 }
 
