@@ -207,7 +207,7 @@ pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
         return None;
     }
     let middle = values.len() / 2;
-    let even = values.len() % 2 == 0;
+    let even = values.len().is_multiple_of(2);
     let (below, &mut upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
     Some(if even {
         f64::midpoint(below.iter().copied().fold(f64::NEG_INFINITY, f64::max), upper)
