@@ -251,7 +251,8 @@ fn labels(room: &Room, frames: &[Stamp], readout_s: f64, rng: &mut Rng) -> Label
     let camera = &room.camera;
     // A row is exposed a share of the read-out time before or after the stamp.
     let at_row = |i: usize, px: Pixel| {
-        let later = Span::from_secs_f64(readout_s * (px.v / f64::from(camera.height()) - 0.5)).expect("a span");
+        let later =
+            Span::from_secs_f64(readout_s * (px.v / f64::from(camera.height()) - 0.5)).expect("a span");
         room.world_from_camera(frames[i] + later)
     };
     let at = |i: usize| room.world_from_camera(frames[i]).expect("the truth covers the frames");

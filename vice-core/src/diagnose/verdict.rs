@@ -131,8 +131,7 @@ fn core(search: &Search) -> Option<Vec<Flaw>> {
     let alone = share(search, &core.flaws);
     let sure = alone >= SURE || (core.flaws.len() == 1 && with >= SURE_WITH);
     let without_it = |fit: &&Fit| core.flaws.iter().any(|f| !fit.flaws.contains(f));
-    let unrivalled =
-        rivals(search, core).is_empty() && !rivals(search, best).iter().any(without_it);
+    let unrivalled = rivals(search, core).is_empty() && !rivals(search, best).iter().any(without_it);
     (sure && unrivalled && plausible(core)).then(|| core.flaws.clone())
 }
 
