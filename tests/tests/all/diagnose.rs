@@ -107,6 +107,93 @@ fn rotation(document: &Value) -> Vector3<f64> {
     Vector3::from_vec(values(fitted(document, "extrinsic-rotation")))
 }
 
+/// The ground truth as a file of another convention, to be read as a TUM file is.
+fn misread(
+    data: &Path,
+    folder: &Path,
+    name: &str,
+    write: impl Fn([f64; 7]) -> [f64; 7],
+) -> std::path::PathBuf {
+    let truth = folder.join("truth.txt");
+    if !truth.exists() {
+        good(vice(&["convert", text(data), "--to", "tum", text(&truth)]));
+    }
+    let mut out = String::new();
+    for line in std::fs::read_to_string(&truth).unwrap().lines().filter(|l| !l.starts_with('#')) {
+        let mut columns = line.split_whitespace();
+        let stamp = columns.next().unwrap();
+        let numbers: Vec<f64> = columns.map(|c| c.parse().unwrap()).collect();
+        let written = write(numbers.try_into().unwrap()).map(|v| format!("{v:.12}"));
+        out.push_str(&format!("{stamp} {}\n", written.join(" ")));
+    }
+    let path = folder.join(format!("{name}.txt"));
+    std::fs::write(&path, out).unwrap();
+    path
+}
+
+#[test]
+fn another_convention_of_euroc_is_named_mended_and_read_so() {
+    let Some(data) = shared("data/euroc_v1_01") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let labels = data.join("labels/floor.csv");
+    let inverse = |p: [f64; 7]| {
+        let [x, y, z, qx, qy, qz, qw] = p;
+        let pose = nalgebra::Isometry3::from_parts(
+            nalgebra::Translation3::new(x, y, z),
+            nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(qw, qx, qy, qz)),
+        )
+        .inverse();
+        let (t, q) = (pose.translation.vector, pose.rotation.coords);
+        [t.x, t.y, t.z, q.x, q.y, q.z, q.w]
+    };
+    type Write<'a> = &'a dyn Fn([f64; 7]) -> [f64; 7];
+    let cases: [(&str, &str, Write<'_>); 4] = [
+        ("inverse", "convention:inverse-pose", &inverse),
+        ("conjugate", "convention:conjugate-quaternion", &|[x, y, z, a, b, c, w]| [x, y, z, -a, -b, -c, w]),
+        ("wxyz", "convention:quaternion-order", &|[x, y, z, a, b, c, w]| [x, y, z, w, a, b, c]),
+        ("mm", "convention:length-unit", &|[x, y, z, a, b, c, w]| [1e3 * x, 1e3 * y, 1e3 * z, a, b, c, w]),
+    ];
+    for (word, name, write) in cases {
+        let estimate = misread(&data, folder.path(), word, write);
+        let diagnosis = folder.path().join(format!("{word}.json"));
+        let same = [text(&data), "--labels", text(&labels), "--estimate", text(&estimate)];
+        good(vice(&[&["diagnose"], &same[..], &["--json", text(&diagnosis)]].concat()));
+        let document: Value = serde_json::from_str(&std::fs::read_to_string(&diagnosis).unwrap()).unwrap();
+        let verdict = &document["verdict"];
+        assert_eq!((&verdict["kind"], &verdict["flaws"][0]), (&"named".into(), &name.into()), "{verdict}");
+        assert_eq!(verdict["estimate_as"][0], word, "{verdict}");
+        assert!(
+            verdict["sentence"].as_str().unwrap().contains(&format!("--estimate-as {word}")),
+            "{verdict}"
+        );
+        // Read so, and written so, it is as good as the ground truth.
+        let mended = folder.path().join(format!("{word}-mended.txt"));
+        let stream = ["convert", text(&data), "--stream", text(&estimate), "--to", "tum", text(&mended)];
+        good(vice(&[&stream[..], &["--mend", text(&diagnosis)]].concat()));
+        for (estimate, more) in [(&estimate, vec!["--estimate-as", word]), (&mended, vec![])] {
+            let out = folder.path().join("out.json");
+            let args = ["evaluate", text(&data), "--labels", text(&labels), "--estimate", text(estimate)];
+            good(vice(&[&args[..], &more, &["--json", text(&out)]].concat()));
+            let result: Value = serde_json::from_str(&std::fs::read_to_string(&out).unwrap()).unwrap();
+            for part in result["pixel"].as_array().unwrap() {
+                let rmse_px = part["pooled_rmse_px"].as_f64().unwrap();
+                assert!((rmse_px - 0.826275422558908).abs() < 1e-5, "{word}: {rmse_px}");
+            }
+        }
+    }
+    let wrong = vice(&[
+        "evaluate",
+        text(&data),
+        "--labels",
+        text(&labels),
+        "--estimate",
+        "ground-truth",
+        "--estimate-as",
+        "upside",
+    ]);
+    assert!(wrong.code == 2 && wrong.stderr.contains("unknown convention `upside`"), "{}", wrong.stderr);
+}
+
 /// EuRoC's extrinsics turned by two degrees on the camera's side.
 fn turned(data: &Path, folder: &Path) -> (std::path::PathBuf, Vector3<f64>) {
     let turn = Vector3::new(0.6, -0.7, 0.387).normalize() * 2.0_f64.to_radians();
@@ -183,14 +270,15 @@ fn the_board_of_euroc_is_reported_as_what_it_is() {
         let zmap = ["--depth", "zmap", "--zmap-occlusion", occlusion];
         let with = |more: &[&str]| euroc(&data, "board", &[&zmap[..], more].concat());
         let base = with(&[]);
+        // The depth's noise is in the interval of its own turn, which plain least squares puts at 0.36 degrees.
         let part = fitted(&base, "extrinsic-rotation");
-        let size = part["size"]["value"].as_f64().unwrap().to_degrees();
-        assert!((size - 0.36).abs() < 0.02, "{size}");
+        let [low, high] = ["low", "high"].map(|end| part["size"][end].as_f64().unwrap().to_degrees());
+        assert!(low < 0.34 && high > 0.38, "{low} {high}");
         if occlusion == "off" {
-            let (before, after) = (base["rmse_px"].as_f64().unwrap(), part["rmse_px"].as_f64().unwrap());
-            assert!((before - 2.47).abs() < 0.01 && (after - 1.04).abs() < 0.03, "{before} {after}");
+            let before = base["rmse_px"].as_f64().unwrap();
+            assert!((before - 2.47).abs() < 0.01, "{before}");
         }
-        // A principal point and a drift do as well: a rotation is not named at full confidence.
+        // A principal point and a drift do as well: a rotation is not named.
         assert_ne!(base["verdict"]["kind"], "named", "{}", base["verdict"]);
 
         let shifted = with(&["--time-offset", "0.05"]);
@@ -201,12 +289,24 @@ fn the_board_of_euroc_is_reported_as_what_it_is() {
 
         let wrong = with(&["--calibration", text(&calibration)]);
         assert_eq!(wrong["verdict"]["flaws"][0], "extrinsic-rotation", "{}", wrong["verdict"]);
-        // used = true · Exp(own) · Exp(turn)
-        let exp = |v: Vector3<f64>| nalgebra::UnitQuaternion::from_scaled_axis(v);
-        let found = exp(rotation(&base)).inverse() * exp(rotation(&wrong));
-        let off = (found.inverse() * exp(turn)).angle().to_degrees();
-        assert!(off < 0.1, "{off} degrees off");
+        let off = (rotation(&wrong) - turn).norm().to_degrees();
+        let widest = intervals(fitted(&wrong, "extrinsic-rotation"));
+        assert!(
+            off < widest.to_degrees(),
+            "{off} degrees off, {} is half the widest interval",
+            widest.to_degrees()
+        );
     }
+}
+
+/// Half the widest interval of a part.
+fn intervals(part: &Value) -> f64 {
+    let widths = part["parameters"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| 0.5 * (p["high"].as_f64().unwrap() - p["low"].as_f64().unwrap()));
+    widths.fold(0.0, f64::max)
 }
 
 #[test]
@@ -216,13 +316,8 @@ fn too_few_labels_are_said_on_one_line() {
     let labels = data.join("labels/floor.csv");
     let args =
         ["diagnose", text(&data), "--labels", text(&labels), "--estimate", "ground-truth", "--points", "0"];
-    let run = vice(&args);
-    assert_eq!(run.code, 1);
-    assert!(
-        run.stderr.contains("too few labels to fit") && run.stderr.lines().count() == 1,
-        "{}",
-        run.stderr
-    );
+    let said = good(vice(&args));
+    assert!(said.contains("verdict: too few labels for any answer"), "{said}");
 
     // Nothing is named, so that there is nothing to apply.
     let out = folder.path().join("c.toml");
@@ -238,6 +333,7 @@ fn too_few_labels_are_said_on_one_line() {
     ]);
     assert_eq!(run.code, 1);
     assert!(run.stderr.contains("nothing to apply") && !out.exists(), "{}", run.stderr);
+    assert!(run.stdout.contains("verdict: no flaw found"), "the answer is not lost: {}", run.stdout);
     for (wrong, says) in [(vec!["--flaws", "fov"], "unknown flaw"), (vec!["--apply", "c.json"], ".toml")] {
         let run = vice(&[&args[..6], &wrong].concat());
         assert!(run.code == 2 && run.stderr.contains(says), "{}", run.stderr);

@@ -140,11 +140,12 @@ impl NoiseModel {
             return Sizes {
                 white_px,
                 walk_px,
-                position_m: 1e-4,
+                // Euler's method is late by half a sample: millimetres as the speed changes.
+                position_m: 2e-3,
                 yaw_rad: 1e-5,
                 lean_rad: 0.0,
-                jitter_m: 2e-4,
-                jitter_rad: 5e-5,
+                jitter_m: 1e-3,
+                jitter_rad: 1e-4,
                 accel: ACCEL * times[POSITION],
                 gyro: GYRO * times[YAW],
             };

@@ -21,6 +21,8 @@ const OFFSETS_S: [f64; 14] =
 const RATES: [f64; 9] = [5e-4, 2e-3, 5e-3, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5];
 const STEPS_S: [f64; 4] = [0.03, 0.08, 0.15, 0.4];
 const STEP_TIMES: usize = 12;
+/// Shares of the span next to its ends in which no step is looked for.
+const EDGE: f64 = 0.1;
 const SINKS_M_S: [f64; 5] = [0.01, 0.03, 0.06, 0.12, 0.25];
 
 /// The best start of a flaw beside other values; those values where nothing is better.
@@ -53,7 +55,8 @@ pub(super) fn start(work: &Work<'_, '_>, flaw: Flaw, beside: &Theta) -> Theta {
         Flaw::ClockStep => {
             let (first, last) = span(work);
             for i in 1..=STEP_TIMES {
-                let at = first + (last - first) * (i as f64) / (STEP_TIMES + 1) as f64;
+                let at = first
+                    + (last - first) * (EDGE + (1.0 - 2.0 * EDGE) * (i as f64) / (STEP_TIMES + 1) as f64);
                 for size in both(&STEPS_S) {
                     try_it(beside.with(Flaw::ClockStep, &[size, at]), &mut best);
                 }
@@ -67,7 +70,10 @@ pub(super) fn start(work: &Work<'_, '_>, flaw: Flaw, beside: &Theta) -> Theta {
                 width *= 0.5;
                 for sign in [-1.0, 1.0] {
                     let [size, at] = [best.1.of(flaw)[0], best.1.of(flaw)[1]];
-                    try_it(beside.with(flaw, &[size, at + sign * width]), &mut best);
+                    // A step before all labels is an offset.
+                    let inside =
+                        |at: f64| at.clamp(first + EDGE * (last - first), last - EDGE * (last - first));
+                    try_it(beside.with(flaw, &[size, inside(at + sign * width)]), &mut best);
                     try_it(beside.with(flaw, &[size * (1.0 + 0.2 * sign), at]), &mut best);
                 }
             }
