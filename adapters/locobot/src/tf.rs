@@ -9,7 +9,6 @@ mod build;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use vice_core::error::{DataError, DataResult, ErrorKind};
-use vice_core::frames::Rigid;
 use vice_core::suspicion::Suspicion;
 use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::{NoPose, Trajectory};

@@ -34,5 +34,10 @@ fn no_case_of_the_field_is_misread() {
         .unwrap();
     let said = String::from_utf8_lossy(&run.stdout);
     let failed: Vec<&str> = said.lines().filter(|line| line.starts_with("FAIL")).collect();
-    assert!(run.status.success() && failed.is_empty(), "{}\n{}", failed.join("\n"), String::from_utf8_lossy(&run.stderr));
+    assert!(
+        run.status.success() && failed.is_empty(),
+        "{}\n{}",
+        failed.join("\n"),
+        String::from_utf8_lossy(&run.stderr)
+    );
 }

@@ -41,17 +41,17 @@ pub(crate) const ASKED: [&str; 29] = [
     "calibration",
 ];
 
+/// What must be named where no file holds it.
 fn unless_requested(argument: clap::Arg) -> clap::Arg {
-    argument.required(false).required_unless_present("request")
+    match argument.get_id().as_str() {
+        "path" | "labels" | "estimate" => argument.required(false).required_unless_present("request"),
+        _ => argument,
+    }
 }
 
 /// Data set, labels, pose streams and depth; or all of it from a file.
 #[derive(Debug, clap::Args)]
-#[command(
-    mut_arg("path", unless_requested),
-    mut_arg("labels", unless_requested),
-    mut_arg("estimate", unless_requested)
-)]
+#[command(mut_args(unless_requested))]
 pub(crate) struct EvaluationArgs {
     #[command(flatten)]
     dataset: DatasetArgs,

@@ -2,6 +2,8 @@ use approx::assert_relative_eq;
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
+use vice_core::frames::Rigid;
+
 use super::*;
 
 fn at(x: f64, yaw: f64) -> Transform {
