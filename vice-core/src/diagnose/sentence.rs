@@ -139,6 +139,9 @@ impl Reporter<'_, '_, '_> {
                     why.push_str(&format!("; it jumps or slides at {}", at.join(", ")));
                 }
                 let is_noise = inertial && none > 0.3 && !*jumps;
+                if is_noise && flaws.is_empty() {
+                    flaws.push("pose-noise".to_string());
+                }
                 let kind = if is_noise { VerdictKind::Named } else { VerdictKind::Unexplained };
                 let sentence = if is_noise {
                     format!(

@@ -11,6 +11,8 @@ const SURE: f64 = 0.88;
 const RIVAL: f64 = 2.5;
 /// ... or, of one flaw, all hypotheses that hold it this one.
 const SURE_WITH: f64 = 0.97;
+/// Fewer labels than these are too few for any answer.
+const FEWEST_LABELS: usize = 8;
 /// RMSE_2D that is hardly less.
 const HARDLY_LESS: f64 = 0.9;
 /// Of two flaws at once each is at most this times what is expected of it.
@@ -86,7 +88,7 @@ pub(super) fn decide(
     // What is not above the labels' own noise, and stays as it is without the flaw, is nobody's flaw.
     let nothing_above = rmse_px <= labels_rmse_px && left_px > HARDLY_LESS * rmse_px;
     let is_none = best.fit.flaws.is_empty() || none > NONE || nothing_above;
-    let times = needed(search);
+    let times = needed(search).max(FEWEST_LABELS as f64 / best.fit.residuals.len().max(1) as f64);
     if times > 1.0 && (is_none || best.posterior < SURE) {
         return Decision::TooFew { times };
     }
