@@ -153,12 +153,12 @@ fn by_positions(
     })
 }
 
-/// RMS angle between the turns of both streams over steps of a twentieth of the run; `None` where the reference hardly
-/// turns, so that nothing can be said.
+/// RMS angle between the turns of both streams over a quarter of the run; `None` where the reference hardly turns, so that
+/// nothing can be said.
 fn motion_error_rad(reference: &[WorldFromBody], estimate: &[WorldFromBody]) -> Option<f64> {
-    let step = (reference.len() / 20).max(1);
+    let step = (reference.len() / 4).max(1);
     let (mut sum, mut turned, mut count) = (0.0_f64, 0.0_f64, 0_i32);
-    for i in (0..reference.len() - step).step_by((step / 4).max(1)) {
+    for i in (0..reference.len() - step).step_by((step / 8).max(1)) {
         let turn = |poses: &[WorldFromBody]| -> UnitQuaternion<f64> {
             poses[i].rotation().inverse() * poses[i + step].rotation()
         };

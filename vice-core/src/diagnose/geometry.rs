@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-use super::scene::{Scene, View};
+use super::scene::Scene;
+use super::view::View;
 use crate::camera::Pixel;
 
 /// A label's derivatives, pixels.
@@ -68,9 +69,9 @@ impl Geometry {
             })
             .collect();
         let mut frames: Vec<FrameEvents> = vec![FrameEvents::default(); scene.frames.len()];
-        for f in 1..frames.len() {
-            frames[f].dt_s = scene.frames[f].t_s - scene.frames[f - 1].t_s;
-            frames[f].step = view.at_frames[f].translation() - view.at_frames[f - 1].translation();
+        for (f, frame) in frames.iter_mut().enumerate().skip(1) {
+            frame.dt_s = scene.frames[f].t_s - scene.frames[f - 1].t_s;
+            frame.step = view.at_frames[f].translation() - view.at_frames[f - 1].translation();
         }
         for (i, label) in scene.labels.iter().enumerate() {
             frames[label.frame].labels.push(i);

@@ -22,14 +22,17 @@ mod gross;
 mod mend;
 mod motion;
 mod noise;
+mod normal;
 mod outliers;
 mod report;
 mod scene;
 mod search;
 mod sensitivity;
+mod sentence;
 mod starts;
 mod theta;
 mod verdict;
+mod view;
 mod words;
 
 pub use document::{
@@ -54,6 +57,10 @@ use starts::{robust_cost, start};
 use crate::conventions::Convention;
 use crate::evaluate::trial::Trial;
 use crate::evaluate::{EvaluateError, Evaluation};
+
+/// Of more points than these at once some are left out: the cost grows with their square, and what all points of a frame
+/// share is known from these.
+const MOST_POINTS: usize = 10;
 
 /// Why nothing could be diagnosed.
 #[derive(Debug, thiserror::Error)]
@@ -129,7 +136,7 @@ pub fn diagnose(
 }
 
 /// What is wrong with the stream as a whole.
-pub(self) struct Gross {
+struct Gross {
     conventions: Vec<Convention>,
     frozen: bool,
     /// How much likelier it is than what was read, as a logarithm.
@@ -137,7 +144,7 @@ pub(self) struct Gross {
 }
 
 /// Labels, poses as they are taken, and the RMSE_2D of what was read.
-pub(self) struct Prepared<'a> {
+struct Prepared<'a> {
     scene: Scene<'a>,
     motion: Motion<'a>,
     /// The same poses as they are read, not smoothed.
@@ -162,6 +169,7 @@ impl<'a> Prepared<'a> {
         let keep: Vec<bool> =
             scene.labels.iter().map(|l| posed[l.frame] && posed[scene.segments[l.segment].frame]).collect();
         scene.only(&keep);
+        scene.thin(MOST_POINTS);
         if scene.labels.is_empty() {
             return Err(DiagnoseError::NothingScored);
         }

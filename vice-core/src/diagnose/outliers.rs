@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use super::filter::{Shifts, Weights, whiten};
-use super::fit::{Fit, Normal, Work, expected_of};
+use super::fit::{Fit, Work, expected_of};
+use super::normal::Normal;
 use super::scene::{Residual, Scene};
 
 /// Variance of an outlier over that of a usual label.

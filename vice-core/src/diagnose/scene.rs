@@ -6,19 +6,20 @@
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use nalgebra::{Point3, Vector2, Vector3};
+use nalgebra::{Point3, Vector2};
 use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::flaw::{Flaw, PARAMETERS};
 use super::motion::{Motion, Reader};
 use super::theta::Theta;
+use super::view::{View, row_share};
 use crate::camera::{Camera, Pixel};
 use crate::dataset::Floor;
 use crate::depth::{DepthSource, Keyframe};
 use crate::evaluate::trial::Trial;
 use crate::evaluate::{EvaluateError, Evaluation};
-use crate::frames::{BodyFromCamera, WorldFromBody, WorldFromCamera};
+use crate::frames::{BodyFromCamera, WorldFromBody};
 use crate::time::Stamp;
 
 /// Where a label's key point is carried minus the label, pixels.
@@ -26,6 +27,9 @@ pub(super) type Residual = Vector2<f64>;
 
 /// What a label costs that cannot be carried at all (behind the camera, no depth), pixels a coordinate.
 pub(super) const LOST_PX: f64 = 400.0;
+/// Depths of the segments' key points, metres along the optical axis.
+type Depths = Arc<Vec<Option<f64>>>;
+
 /// Answers of a depth source that are kept.
 const KEPT_DEPTHS: usize = 96;
 
@@ -61,21 +65,21 @@ pub(super) struct Label {
 /// Everything that does not change with the estimate.
 pub(super) struct Scene<'a> {
     pub(super) camera: &'a Camera,
-    source: &'a dyn DepthSource,
+    pub(super) source: &'a dyn DepthSource,
     pub(super) own_anchor: bool,
     pub(super) first_frame: Stamp,
     pub(super) frames: Vec<Frame>,
     pub(super) segments: Vec<Segment>,
     pub(super) labels: Vec<Label>,
     /// The anchor's stream; none where the estimate is its own anchor.
-    anchor: Option<Motion<'a>>,
+    pub(super) anchor: Option<Motion<'a>>,
     /// Whether each frame has a pose of the anchor.
     anchored: Vec<bool>,
     /// Share of a depth that is noise.
     pub(super) roughness: f64,
     /// Whether the depth does not depend on where the camera is thought to be.
-    fixed_depth: bool,
-    kept: Mutex<HashMap<Vec<u64>, Arc<Vec<Option<f64>>>>>,
+    pub(super) fixed_depth: bool,
+    kept: Mutex<HashMap<Vec<u64>, Depths>>,
 }
 
 impl<'a> Scene<'a> {
@@ -158,6 +162,26 @@ impl<'a> Scene<'a> {
         self.kept = Mutex::default();
     }
 
+    /// Without some of the points, evenly in their order, where more are followed at once.
+    pub(super) fn thin(&mut self, most: usize) {
+        let mut change = vec![0_i64; self.frames.len() + 1];
+        for segment in &self.segments {
+            change[segment.frame] += 1;
+            change[self.labels[segment.labels.end - 1].frame] -= 1;
+        }
+        let mut now = 0;
+        let at_once = change.iter().map(|c| {
+            now += c;
+            now
+        });
+        let every = (at_once.max().unwrap_or(0).max(0) as usize).div_ceil(most.max(1)).max(1);
+        if every > 1 {
+            let keep: Vec<bool> =
+                self.labels.iter().map(|l| self.segments[l.segment].point.is_multiple_of(every)).collect();
+            self.only(&keep);
+        }
+    }
+
     /// Whether a camera turned and moved by a little changes no depth.
     fn depth_is_fixed(&self, evaluation: &Evaluation<'_>, stream: usize) -> Result<bool, DiagnoseError> {
         let poses = super::motion::Poses::new(&evaluation.streams[stream].trajectory, self.first_frame);
@@ -221,7 +245,7 @@ impl<'a> Scene<'a> {
         theta: &Theta,
         reader: &Reader<'_>,
         motion: &Motion<'_>,
-    ) -> Result<Arc<Vec<Option<f64>>>, DiagnoseError> {
+    ) -> Result<Depths, DiagnoseError> {
         let mut key = Vec::new();
         let camera_moves = |f: &Flaw| f.of_the_camera() || *f == Flaw::RollingShutter || self.own_anchor;
         if !self.fixed_depth {
@@ -334,117 +358,5 @@ impl<'a> Scene<'a> {
             0..=1 => parameters.iter().map(column).collect(),
             _ => parameters.par_iter().map(column).collect(),
         }
-    }
-}
-
-/// When a row is exposed, as a share of the read-out time from the middle row.
-fn row_share(camera: &Camera, px: Pixel) -> f64 {
-    px.v / f64::from(camera.height()) - 0.5
-}
-
-/// The scene as it is with some flaws taken out.
-pub(super) struct View<'s, 'a> {
-    scene: &'s Scene<'a>,
-    camera: Camera,
-    reader: Reader<'s>,
-    readout_s: f64,
-    pub(super) at_frames: Vec<WorldFromBody>,
-    cameras: Vec<Option<BodyFromCamera>>,
-    /// Key points in the world; none without depth.
-    pub(super) points: Vec<Option<Point3<f64>>>,
-}
-
-impl View<'_, '_> {
-    /// The camera when the row of a pixel is exposed.
-    pub(super) fn world_from_camera(&self, frame: usize, px: Pixel) -> Option<WorldFromCamera> {
-        let body_from_camera = self.cameras[frame]?;
-        let body = if self.readout_s == 0.0 {
-            self.at_frames[frame]
-        } else {
-            self.reader.at(self.scene.frames[frame].t_s + self.readout_s * row_share(&self.camera, px))
-        };
-        Some(body * body_from_camera)
-    }
-
-    pub(super) fn extrinsics(&self, frame: usize) -> Option<BodyFromCamera> {
-        self.cameras[frame]
-    }
-
-    pub(super) fn residual(&self, label: &Label) -> Option<Residual> {
-        let point = self.points[label.segment]?;
-        let camera = self.world_from_camera(label.frame, label.px)?;
-        let local = camera.rotation().inverse() * (point.coords - camera.translation());
-        let px = self.camera.project(&Point3::from(local)).ok()?;
-        Some(Vector2::new(px.u - label.px.u, px.v - label.px.v))
-    }
-
-    /// How a label's pixel moves with its point in the world (pixels a metre), and the lever from the body to the point.
-    pub(super) fn answer(&self, label: &Label) -> Option<([Vector3<f64>; 2], Vector3<f64>)> {
-        let point = self.points[label.segment]?;
-        let camera = self.world_from_camera(label.frame, label.px)?;
-        let local = camera.rotation().inverse() * (point.coords - camera.translation());
-        let step = 1e-4 * local.norm().max(1e-3);
-        let mut by_local = [Vector3::zeros(); 2];
-        for axis in 0..3 {
-            let mut at = [local, local];
-            at[0][axis] -= step;
-            at[1][axis] += step;
-            let below = self.camera.project(&Point3::from(at[0])).ok()?;
-            let above = self.camera.project(&Point3::from(at[1])).ok()?;
-            by_local[0][axis] = (above.u - below.u) / (2.0 * step);
-            by_local[1][axis] = (above.v - below.v) / (2.0 * step);
-        }
-        let rotation = camera.rotation();
-        let lever = point.coords - self.at_frames[label.frame].translation();
-        Some((by_local.map(|g| rotation * g), lever))
-    }
-
-    /// Where a key pixel lands in the world with the body moved and turned, the depth asked again where it depends on
-    /// that.
-    pub(super) fn lifted(
-        &self,
-        segment: &Segment,
-        px: Pixel,
-        moved: Vector3<f64>,
-        turned: Vector3<f64>,
-        depth_follows: bool,
-    ) -> Option<Point3<f64>> {
-        let body = self.at_frames[segment.frame];
-        let turn = nalgebra::UnitQuaternion::from_scaled_axis(turned);
-        let body: WorldFromBody =
-            crate::frames::Rigid::from_parts(body.translation() + moved, turn * body.rotation());
-        let body_from_camera = self.cameras[segment.frame]?;
-        let camera = body * body_from_camera;
-        let at = &self.scene.frames[segment.frame];
-        let placed = if self.scene.own_anchor { Some(camera) } else { self.anchor_camera(segment.frame) };
-        let depth = if depth_follows {
-            let keyframe = Keyframe {
-                stamp: at.stamp,
-                frame: at.index,
-                camera: &self.camera,
-                body_from_camera,
-                world_from_camera: placed,
-                floor: at.floor?,
-            };
-            let depths = self.scene.source.depths(&keyframe, &[px]).ok()?;
-            depths.first()?.as_ref().ok()?.z_m
-        } else {
-            let point = self.points[self.scene.labels[segment.labels.start].segment]?;
-            let as_is = self.at_frames[segment.frame] * body_from_camera;
-            (as_is.rotation().inverse() * (point.coords - as_is.translation())).z
-        };
-        let ray = self.camera.unproject(px).ok()?;
-        Some(camera.transform_point(&Point3::from(ray * depth)))
-    }
-
-    fn anchor_camera(&self, frame: usize) -> Option<WorldFromCamera> {
-        let anchor = self.scene.anchor.as_ref()?;
-        let reader = anchor.reader(&Theta::zero()).ok()?;
-        Some(reader.at(self.scene.frames[frame].t_s) * self.cameras[frame]?)
-    }
-
-    /// Whether the depth of a key frame answers to the pose of its body.
-    pub(super) fn depth_follows(&self) -> bool {
-        !self.scene.fixed_depth
     }
 }

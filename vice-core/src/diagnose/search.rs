@@ -4,10 +4,11 @@ use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::filter::Weights;
-use super::fit::{Fit, Normal, Work, expected_of, parameters_of};
+use super::fit::{Fit, Work, expected_of, parameters_of};
 use super::flaw::Flaw;
 use super::gross::independent;
 use super::noise::Logs;
+use super::normal::Normal;
 use super::outliers;
 use super::starts::{robust_cost, start};
 use super::theta::Theta;
@@ -37,12 +38,15 @@ pub(super) struct Ranked {
     pub(super) posterior: f64,
 }
 
+/// Flaws that cannot be evaluated, and why.
+pub(super) type Refused = Vec<(Flaw, String)>;
+
 /// What was found.
 pub(super) struct Search {
     /// All of them, the likeliest first.
     pub(super) ranked: Vec<Ranked>,
     /// Flaws that cannot be evaluated.
-    pub(super) refused: Vec<(Flaw, String)>,
+    pub(super) refused: Refused,
 }
 
 /// Likelihood of a set of flaws before anything is seen, as a logarithm.
@@ -126,11 +130,7 @@ fn best_score(fits: &[Fit]) -> f64 {
 }
 
 /// No flaw and each alone, from the best of many starts.
-fn singles(
-    work: &Work<'_, '_>,
-    flaws: &[Flaw],
-    logs: &Logs,
-) -> Result<(Vec<Fit>, Vec<(Flaw, String)>), DiagnoseError> {
+fn singles(work: &Work<'_, '_>, flaws: &[Flaw], logs: &Logs) -> Result<(Vec<Fit>, Refused), DiagnoseError> {
     let zero = Theta::zero();
     let sets: Vec<Vec<Flaw>> = std::iter::once(vec![]).chain(flaws.iter().map(|f| vec![*f])).collect();
     let first: Vec<Result<Fit, DiagnoseError>> = sets

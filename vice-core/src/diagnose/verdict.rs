@@ -11,6 +11,12 @@ const SURE: f64 = 0.88;
 const RIVAL: f64 = 2.5;
 /// ... or, of one flaw, all hypotheses that hold it this one.
 const SURE_WITH: f64 = 0.97;
+/// Fewer labels than these are too few for any answer.
+const FEWEST_LABELS: usize = 8;
+/// RMSE_2D that is hardly less.
+const HARDLY_LESS: f64 = 0.9;
+/// Of two flaws at once each is at most this times what is expected of it.
+const USUAL_TIMES: f64 = 4.5;
 /// A second flaw must add this, as a logarithm.
 const SECOND: f64 = 20.0;
 /// No flaw is said where it has this share of the hypotheses.
@@ -59,16 +65,30 @@ pub(super) fn share(search: &Search, flaws: &[Flaw]) -> f64 {
 /// Whether all values are what such a flaw can be.
 fn plausible(fit: &Fit) -> bool {
     let values = fit.values();
-    fit.parameters.iter().all(|p| values[*p].abs() <= PARAMETERS[*p].plausible)
+    // Two at once are believed where each is of a usual size: together they bend to whatever is left.
+    let pair = fit.flaws.len() > 1;
+    fit.parameters.iter().all(|p| {
+        let size = values[*p].abs();
+        size <= PARAMETERS[*p].plausible && !(pair && size > USUAL_TIMES * PARAMETERS[*p].expected)
+    })
 }
 
-pub(super) fn decide(search: &Search, noise: &NoiseModel, rmse_px: f64, labels_rmse_px: f64) -> Decision {
+/// `rmse_px` as the poses are taken, `left_px` without the flaws of the best hypothesis.
+pub(super) fn decide(
+    search: &Search,
+    noise: &NoiseModel,
+    rmse_px: f64,
+    left_px: f64,
+    labels_rmse_px: f64,
+) -> Decision {
     let best = &search.ranked[0];
     let (wanders, jumps) = sick(&best.fit, noise);
     let is_sick = wanders || jumps;
     let none = share(search, &[]);
-    let is_none = best.fit.flaws.is_empty() || none > NONE;
-    let times = needed(search);
+    // What is not above the labels' own noise, and stays as it is without the flaw, is nobody's flaw.
+    let nothing_above = rmse_px <= labels_rmse_px && left_px > HARDLY_LESS * rmse_px;
+    let is_none = best.fit.flaws.is_empty() || none > NONE || nothing_above;
+    let times = needed(search).max(FEWEST_LABELS as f64 / best.fit.residuals.len().max(1) as f64);
     if times > 1.0 && (is_none || best.posterior < SURE) {
         return Decision::TooFew { times };
     }
