@@ -244,7 +244,7 @@ fn what_cannot_be_found_is_said_and_nothing_is_written() {
     refused(&run(&["--chessboard", "big"]), 2, &["big", "6x7"]);
     refused(&run(&[]), 2, &["--apriltag"]);
     refused(&run(&["--chessboard", "6x7", "--border-bits", "3"]), 2, &["3"]);
-    refused(&run(&["--chessboard", "6x7", "--start", "1000"]), 1, &["--start"]);
+    refused(&run(&["--chessboard", "6x7", "--start", "1000"]), 2, &["--start"]);
     assert!(!std::path::Path::new(&out).exists());
 
     // An image that cannot be decoded is skipped and counted.

@@ -104,7 +104,7 @@ fn integrating_the_imu_gives_the_estimate_in_the_file() {
     // The file holds nine decimals.
     assert!((pooled(&ours) - pooled(&file)).abs() < 1e-3, "{} {}", pooled(&ours), pooled(&file));
     assert!((pooled(&ours) - 98.098).abs() < 0.01);
-    assert_eq!(ours["schema"], "vice.result/1");
+    assert_eq!(ours["schema"], "vice.result/2");
     assert_eq!(ours["pixel"][0]["stream"], "ground-truth");
     assert_eq!(ours["trajectory"][0]["matched"], 7);
 }

@@ -6,20 +6,19 @@
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use nalgebra::{Point3, Vector2};
+use nalgebra::Vector2;
 use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::flaw::{Flaw, PARAMETERS};
 use super::motion::{Motion, Reader};
 use super::theta::Theta;
-use super::view::{View, row_share};
 use crate::camera::{Camera, Pixel};
 use crate::dataset::Floor;
 use crate::depth::{DepthSource, Keyframe};
 use crate::evaluate::trial::Trial;
 use crate::evaluate::{EvaluateError, Evaluation};
-use crate::frames::{BodyFromCamera, WorldFromBody};
+use crate::frames::BodyFromCamera;
 use crate::time::Stamp;
 
 /// Where a label's key point is carried minus the label, pixels.
@@ -80,6 +79,11 @@ pub(super) struct Scene<'a> {
     /// Whether the depth does not depend on where the camera is thought to be.
     pub(super) fixed_depth: bool,
     kept: Mutex<HashMap<Vec<u64>, Depths>>,
+}
+
+/// When a row is exposed, as a share of the read-out time from the middle row.
+pub(super) fn row_share(camera: &Camera, px: Pixel) -> f64 {
+    px.v / f64::from(camera.height()) - 0.5
 }
 
 impl<'a> Scene<'a> {
@@ -202,45 +206,8 @@ impl<'a> Scene<'a> {
         Ok(!both.is_empty() && both.iter().all(|(a, b)| (a - b).abs() <= 1e-9 * a.abs()))
     }
 
-    /// Residuals with the flaws taken out; `None` where a label cannot be carried.
-    pub(super) fn residuals(
-        &self,
-        theta: &Theta,
-        motion: &Motion<'_>,
-    ) -> Result<Vec<Option<Residual>>, DiagnoseError> {
-        let view = self.view(theta, motion)?;
-        Ok(self.labels.iter().map(|l| view.residual(l)).collect())
-    }
-
-    pub(super) fn view<'s>(
-        &'s self,
-        theta: &Theta,
-        motion: &'s Motion<'_>,
-    ) -> Result<View<'s, 'a>, DiagnoseError> {
-        let refused = |why: String| DiagnoseError::CannotEvaluate(why);
-        let camera = theta.correct_camera(self.camera).map_err(|e| refused(e.to_string()))?;
-        let reader = motion.reader(theta).map_err(|e| refused(e.to_string()))?;
-        let depths = self.depths(theta, &reader, motion)?;
-        let readout_s = theta.of(Flaw::RollingShutter)[0];
-        let at_frames: Vec<WorldFromBody> = self.frames.iter().map(|f| reader.at(f.t_s)).collect();
-        let cameras: Vec<Option<BodyFromCamera>> =
-            self.frames.iter().map(|f| f.body_from_camera.map(|c| theta.correct_extrinsics(&c))).collect();
-        let mut view = View { scene: self, camera, reader, readout_s, at_frames, cameras, points: vec![] };
-        view.points = self
-            .segments
-            .iter()
-            .zip(depths.iter())
-            .map(|(segment, depth)| {
-                let ray = view.camera.unproject(segment.px).ok()?;
-                let camera = view.world_from_camera(segment.frame, segment.px)?;
-                Some(camera.transform_point(&Point3::from(ray * (*depth)?)))
-            })
-            .collect();
-        Ok(view)
-    }
-
     /// Depths of the segments' key points.
-    fn depths(
+    pub(super) fn depths(
         &self,
         theta: &Theta,
         reader: &Reader<'_>,

@@ -2,17 +2,15 @@
 
 use nalgebra::{Point3, Vector2, Vector3};
 
+use super::DiagnoseError;
+use super::flaw::Flaw;
+use super::motion::Motion;
 use super::motion::Reader;
-use super::scene::{Label, Residual, Scene, Segment};
+use super::scene::{Label, Residual, Scene, Segment, row_share};
 use super::theta::Theta;
 use crate::camera::{Camera, Pixel};
 use crate::depth::Keyframe;
 use crate::frames::{BodyFromCamera, WorldFromBody, WorldFromCamera};
-
-/// When a row is exposed, as a share of the read-out time from the middle row.
-pub(super) fn row_share(camera: &Camera, px: Pixel) -> f64 {
-    px.v / f64::from(camera.height()) - 0.5
-}
 
 /// The scene as it is with some flaws taken out.
 pub(super) struct View<'s, 'a> {
@@ -24,6 +22,45 @@ pub(super) struct View<'s, 'a> {
     pub(super) cameras: Vec<Option<BodyFromCamera>>,
     /// Key points in the world; none without depth.
     pub(super) points: Vec<Option<Point3<f64>>>,
+}
+
+impl<'a> Scene<'a> {
+    /// Residuals with the flaws taken out; `None` where a label cannot be carried.
+    pub(super) fn residuals(
+        &self,
+        theta: &Theta,
+        motion: &Motion<'_>,
+    ) -> Result<Vec<Option<Residual>>, DiagnoseError> {
+        let view = self.view(theta, motion)?;
+        Ok(self.labels.iter().map(|l| view.residual(l)).collect())
+    }
+
+    pub(super) fn view<'s>(
+        &'s self,
+        theta: &Theta,
+        motion: &'s Motion<'_>,
+    ) -> Result<View<'s, 'a>, DiagnoseError> {
+        let refused = |why: String| DiagnoseError::CannotEvaluate(why);
+        let camera = theta.correct_camera(self.camera).map_err(|e| refused(e.to_string()))?;
+        let reader = motion.reader(theta).map_err(|e| refused(e.to_string()))?;
+        let depths = self.depths(theta, &reader, motion)?;
+        let readout_s = theta.of(Flaw::RollingShutter)[0];
+        let at_frames: Vec<WorldFromBody> = self.frames.iter().map(|f| reader.at(f.t_s)).collect();
+        let cameras: Vec<Option<BodyFromCamera>> =
+            self.frames.iter().map(|f| f.body_from_camera.map(|c| theta.correct_extrinsics(&c))).collect();
+        let mut view = View { scene: self, camera, reader, readout_s, at_frames, cameras, points: vec![] };
+        view.points = self
+            .segments
+            .iter()
+            .zip(depths.iter())
+            .map(|(segment, depth)| {
+                let ray = view.camera.unproject(segment.px).ok()?;
+                let camera = view.world_from_camera(segment.frame, segment.px)?;
+                Some(camera.transform_point(&Point3::from(ray * (*depth)?)))
+            })
+            .collect();
+        Ok(view)
+    }
 }
 
 impl View<'_, '_> {

@@ -118,7 +118,7 @@ fn the_format_is_found_by_content() {
     assert!(write(&path, &labels, Overwrite::Replace).unwrap_err().to_string().contains(".csv or .json"));
     let json = folder.path().join("labels.JSON");
     write(&json, &labels, Overwrite::Refuse).unwrap();
-    assert!(write(&json, &labels, Overwrite::Refuse).unwrap_err().to_string().contains("--force"));
+    assert!(write(&json, &labels, Overwrite::Refuse).unwrap_err().to_string().contains("`force`"));
     assert_eq!(read(&json, None).unwrap(), labels);
     let missing = read(folder.path().join("none.csv"), None).unwrap_err().to_string();
     assert!(missing.ends_with("none.csv: no such file"), "{missing}");
