@@ -130,7 +130,7 @@ fn what_is_no_result_is_refused() {
         assert_eq!(run.stderr.lines().count(), 1, "{}", run.stderr);
         assert!(!folder.path().join("x.html").exists());
     };
-    refused("{\"schema\":\"vice.result/2\"}", "newer VICE");
+    refused("{\"schema\":\"vice.result/3\"}", "newer VICE");
     refused("{\"schema\":\"vice.labels/1\"}", "another kind");
     refused("", "not JSON");
     refused("{\"schema\":\"vice.result/1\",\"pixel\":[]}", "mistake");

@@ -57,7 +57,7 @@ fn an_estimate_that_starts_in_the_references_state_is_aligned_by_its_first_pose(
         "{}",
         run.stdout
     );
-    assert!(run.stderr.contains("rest on few poses: 7"), "{}", run.stderr);
+    assert!(run.stdout.contains("rest on few poses: 7"), "{}", run.stdout);
 }
 
 #[test]
