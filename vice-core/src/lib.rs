@@ -4,7 +4,7 @@
 //! calibration ([`camera`], [`frames`]). Reference key points of a [`label::LabelSet`] get a depth from a
 //! [`depth::DepthSource`] at their key frame, are carried along by each pose stream ([`track`], the paper's equation 1)
 //! and compared in pixels with their labels ([`metrics`]). [`mod@evaluate`] is the list of these stages, and a
-//! [`result::ResultDocument`] is what leaves; [`mod@diagnose`] names the flaw behind the pixels. Formats are found by name or by looking in a [`registry::Registry`].
+//! [`result::Evaluated`] is what leaves; [`mod@diagnose`] names the flaw behind the pixels. Formats are found by name or by looking in a [`registry::Registry`].
 //!
 //! The core reads no files and decodes nothing: adapters do.
 #![forbid(unsafe_code)]
