@@ -36,8 +36,7 @@ pub(crate) fn body_from_imu([x, y, z]: [f64; 3]) -> Vector3<f64> {
 /// The virtual camera, the same for all sides.
 pub(crate) fn camera() -> DataResult<Camera> {
     let focal_px = 665.107510106;
-    Camera::new(1024, 768, [focal_px, focal_px, 511.5, 383.5], Model::Pinhole)
-        .map_err(|e| DataError::new(e.to_string()))
+    Camera::new(1024, 768, [focal_px, focal_px, 511.5, 383.5], Model::Pinhole).map_err(DataError::of)
 }
 
 /// Where the cameras of the renderer sit.
@@ -61,7 +60,7 @@ pub(crate) fn body_from_camera(side: Side) -> DataResult<BodyFromCamera> {
         Side::Right => forward(0.05),
         Side::Down => down,
     };
-    BodyFromCamera::try_from_row_major(&matrix).map_err(|e| DataError::new(e.to_string()))
+    BodyFromCamera::try_from_row_major(&matrix).map_err(DataError::of)
 }
 
 #[cfg(test)]

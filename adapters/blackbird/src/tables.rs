@@ -29,10 +29,10 @@ pub(crate) fn read_poses(path: &Path) -> DataResult<(Trajectory, Suspicions)> {
     let mut poses: Vec<(Stamp, WorldFromBody)> = Vec::with_capacity(found.rows.len());
     for (row, line) in found.rows.iter().zip(&found.lines) {
         let pose = ned::pose(row.position_m, row.rotation_wxyz)
-            .map_err(|e| DataError::new(e.to_string()).line(*line).at(path))?;
+            .map_err(|e| DataError::of(e).line(*line).at(path))?;
         poses.push((row.stamp, pose));
     }
-    let trajectory = Trajectory::from_poses(poses).map_err(|e| DataError::new(e.to_string()).at(path))?;
+    let trajectory = Trajectory::from_poses(poses).map_err(|e| DataError::of(e).at(path))?;
     Ok((trajectory, found.suspicions))
 }
 

@@ -50,7 +50,7 @@ fn calibration_of(found: &CameraOverride) -> DataResult<(Camera, BodyFromCamera)
     let lens = found.model.as_deref().unwrap_or("none");
     let model = Model::from_name(lens, found.distortion.as_deref().unwrap_or_default());
     let camera = model.and_then(|model| Camera::new(width, height, intrinsics, model));
-    let camera = camera.map_err(|e| DataError::new(e.to_string()))?;
+    let camera = camera.map_err(DataError::of)?;
     Ok((camera, found.body_from_camera.ok_or_else(|| missing("T_BS"))?))
 }
 

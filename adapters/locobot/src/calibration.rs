@@ -87,7 +87,7 @@ pub(crate) fn camera(info: &CameraInfo, rectified: bool) -> DataResult<Camera> {
         )),
         other => DataError::new(other.to_string()),
     })?;
-    Camera::new(size_x, size_y, [fx, fy, cx, cy], model).map_err(|e| DataError::new(e.to_string()))
+    Camera::new(size_x, size_y, [fx, fy, cx, cy], model).map_err(DataError::of)
 }
 
 #[cfg(test)]

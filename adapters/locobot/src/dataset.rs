@@ -89,7 +89,7 @@ impl RosDataset {
             return Err(DataError::new(format!("topic {}: no frame {index}, there are {n}", images.topic)));
         };
         let payload = self.recording.read(locator)?;
-        let reader = Reader::new(payload.bytes(), images.wire).map_err(|e| DataError::new(e.to_string()));
+        let reader = Reader::new(payload.bytes(), images.wire).map_err(DataError::of);
         reader.and_then(|r| decode(r, images.packing)).map_err(|e| {
             let problem = format!("topic {}, frame {index}: {}", images.topic, one_line(&e));
             self.recording.place(locator, DataError::of_kind(e.kind(), problem))
@@ -232,7 +232,7 @@ impl Dataset for RosDataset {
         let Some(reference) = self.reference() else { return Ok(None) };
         let Ok(world_from_body) = reference.pose_at(stamp, Span::from_millis(100)) else { return Ok(None) };
         let velocity = fit_velocity(&reference, stamp);
-        let velocity_m_s = velocity.map_err(|e| DataError::new(e.to_string()).at(&self.path))?;
+        let velocity_m_s = velocity.map_err(|e| DataError::of(e).at(&self.path))?;
         let zero = Vector3::zeros();
         Ok(Some(InertialState {
             stamp,

@@ -111,7 +111,7 @@ impl CameraPart {
         let [width, height] = self.size;
         Model::from_name(&self.model, &self.distortion)
             .and_then(|model| Camera::new(width, height, self.intrinsics, model))
-            .map_err(|e| DataError::new(e.to_string()))
+            .map_err(DataError::of)
     }
 
     /// The extrinsics.

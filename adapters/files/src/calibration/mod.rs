@@ -279,7 +279,7 @@ impl CameraOverride {
             (None, _, None) => return Err(missing("model")),
         };
         let camera = model.and_then(|model| Camera::new(width, height, intrinsics, model));
-        camera.map_err(|e| DataError::new(e.to_string()))
+        camera.map_err(DataError::of)
     }
 }
 

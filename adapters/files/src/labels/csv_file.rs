@@ -68,7 +68,7 @@ pub fn read_csv_file(bytes: &[u8]) -> DataResult<LabelFile> {
         }
         kept += 1;
         let point = record.get(columns.point).unwrap_or_default().trim();
-        labels.push(point, observation).map_err(|e| label_error(&e))?;
+        labels.push(point, observation).map_err(label_error)?;
     }
     if rows == 0 {
         return Err(no_labels());
@@ -79,7 +79,7 @@ pub fn read_csv_file(bytes: &[u8]) -> DataResult<LabelFile> {
     }
     lenient.check(kept, "pixel")?;
     let labels =
-        labels.finish().map_err(|e| if few > 0 { rounded::error(most_digits) } else { label_error(&e) })?;
+        labels.finish().map_err(|e| if few > 0 { rounded::error(most_digits) } else { label_error(e) })?;
     let mut file = LabelFile::of(labels);
     file.suspicions = lenient.suspicions("");
     if !columns.unknown.is_empty() {

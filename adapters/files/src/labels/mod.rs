@@ -207,13 +207,14 @@ fn no_labels() -> DataError {
 
 /// Rows, if there are any, as a validated set.
 fn validated(rows: Vec<LabelRow>) -> DataResult<LabelSet> {
-    LabelSet::from_rows(rows).map_err(|e| label_error(&e))
+    LabelSet::from_rows(rows).map_err(label_error)
 }
 
 /// With the line of the row at fault.
-fn label_error(e: &LabelError) -> DataError {
-    let error = DataError::new(e.to_string());
-    match e.line() {
+fn label_error(e: LabelError) -> DataError {
+    let line = e.line();
+    let error = DataError::of(e);
+    match line {
         Some(line) => error.line(line),
         None => error,
     }
