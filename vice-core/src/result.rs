@@ -244,18 +244,9 @@ pub struct PathPose {
     pub rotation_wxyz: [f64; 4],
 }
 
-impl Evaluated {
-    /// Leaves out the scored samples and what only plots need, as if they had not been asked for.
-    pub fn drop_samples(&mut self) {
-        self.paths.clear();
-        self.pixel.iter_mut().for_each(|p| p.samples.clear());
-        self.trajectory.iter_mut().for_each(TrajectoryPart::drop_plots);
-    }
-
-    /// Largest [`PixelPart::skipped_percent`] of all parts.
-    pub fn worst_skipped_percent(&self) -> f64 {
-        self.pixel.iter().map(PixelPart::skipped_percent).fold(0.0, f64::max)
-    }
+/// Largest [`PixelPart::skipped_percent`] of some parts.
+pub fn worst_skipped_percent(parts: &[PixelPart]) -> f64 {
+    parts.iter().map(PixelPart::skipped_percent).fold(0.0, f64::max)
 }
 
 impl TrajectoryPart {

@@ -172,7 +172,7 @@ fn exact_poses_give_no_error_and_every_sample_is_scored() {
     let t = &document.trajectory[0];
     assert_eq!(t.matched, FRAMES);
     assert!(t.rmse_3d_m.unwrap() < 1e-9 && t.aoe_rad.unwrap() < 1e-7 && t.roe_rad.unwrap() < 1e-7);
-    assert_eq!(document.worst_skipped_percent(), 0.0);
+    assert_eq!(crate::result::worst_skipped_percent(&document.pixel), 0.0);
     let text = serde_json::to_string(&document).unwrap();
     assert_eq!(serde_json::from_str::<Evaluated>(&text).unwrap(), document);
 }

@@ -8,7 +8,7 @@ mod read;
 mod version_1;
 
 use serde::{Deserialize, Serialize};
-use vice_core::result::{DatasetPart, Evaluated, PathPart, PixelPart, TrajectoryPart};
+use vice_core::result::{DatasetPart, Evaluated, PathPart, PixelPart, TrajectoryPart, worst_skipped_percent};
 use vice_core::suspicion::Suspicions;
 
 use read::parse;
@@ -87,6 +87,6 @@ impl ResultDocument {
 
     /// Largest [`PixelPart::skipped_percent`] of all parts.
     pub fn worst_skipped_percent(&self) -> f64 {
-        self.pixel.iter().map(PixelPart::skipped_percent).fold(0.0, f64::max)
+        worst_skipped_percent(&self.pixel)
     }
 }
