@@ -1,24 +1,27 @@
 //! One Kalman pass over the frames that makes residuals independent: what each label adds to those before it.
 //!
 //! State: the error of the current pose (position, rotation about the world's axes, and velocity of an inertial
-//! estimate), its jitter (fresh at each frame), and for each point that is followed the error of its place in the world
+//! estimate), the same with the jitter of this frame, and for each point that is followed the error of its place in the world
 //! (made by the pose error, jitter and label noise of its key frame and by its depth) and the walk of its label. All
 //! labels of a frame share its pose, all labels of a segment its key frame. Cost: frames times the square of the state.
 
-#![expect(clippy::needless_range_loop, reason = "indices of matrices are clearer as indices")]
+mod state;
+mod update;
 
-use super::geometry::Geometry;
+use super::geometry::{FrameEvents, Geometry};
 use super::noise::Sizes;
 use super::scene::Residual;
+use state::{POSE, SLOT, State};
+use update::{AT_ONCE, Row, Update};
 
 /// Roll and pitch forget in this time, seconds.
 const LEAN_S: f64 = 2.5;
 const GRAVITY_M_S2: f64 = 9.81;
 /// How well the velocity is known that an integration starts with.
 const START_M_S: f64 = 0.005;
-/// Numbers of a followed point: its place and the walk of its label.
-const SLOT: usize = 5;
-const JITTER: usize = 6;
+/// A shift is followed for so many frames after its segment, or its label.
+const AFTER: usize = 30;
+const AFTER_LABEL: usize = 12;
 
 /// Frames at which the pose may have jumped: more process noise over the steps up to these frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,58 +73,6 @@ pub(super) struct Shift {
     pub(super) with: [Vec<f64>; 2],
 }
 
-struct State {
-    n: usize,
-    stride: usize,
-    p: Vec<f64>,
-    /// One vector for each column.
-    means: Vec<Vec<f64>>,
-    free: Vec<usize>,
-}
-
-impl State {
-    #[inline(always)]
-    fn clear(&mut self, at: usize, count: usize) {
-        for i in at..at + count {
-            for k in 0..self.stride {
-                self.p[i * self.stride + k] = 0.0;
-                self.p[k * self.stride + i] = 0.0;
-            }
-            self.means.iter_mut().for_each(|m| m[i] = 0.0);
-        }
-    }
-
-    /// `state[to] += times · state[from]`.
-    #[inline(always)]
-    fn add(&mut self, to: usize, from: usize, times: f64) {
-        let s = self.stride;
-        for k in 0..self.n {
-            self.p[to * s + k] += times * self.p[from * s + k];
-        }
-        for k in 0..self.n {
-            self.p[k * s + to] += times * self.p[k * s + from];
-        }
-        self.means.iter_mut().for_each(|m| m[to] += times * m[from]);
-    }
-
-    #[inline(always)]
-    fn scale(&mut self, at: usize, times: f64) {
-        let s = self.stride;
-        for k in 0..self.n {
-            self.p[at * s + k] *= times;
-        }
-        for k in 0..self.n {
-            self.p[k * s + at] *= times;
-        }
-        self.means.iter_mut().for_each(|m| m[at] *= times);
-    }
-
-    #[inline(always)]
-    fn widen(&mut self, at: usize, variance: f64) {
-        self.p[at * self.stride + at] += variance;
-    }
-}
-
 /// A label or key label whose shift is being followed.
 struct Following {
     of: usize,
@@ -131,7 +82,7 @@ struct Following {
 }
 
 /// Makes columns independent: `columns[0]` the residuals, then derivatives. With `shifts`, also what a shift of each
-/// key label would do.
+/// label or key label would do.
 pub(super) fn whiten(
     geometry: &Geometry,
     columns: &[&[Residual]],
@@ -143,292 +94,246 @@ pub(super) fn whiten(
     // The same sums in the same order, with the widest registers that there are.
     pulp::Arch::new().dispatch(
         #[inline(always)]
-        || pass(geometry, columns, sizes, weights, jumps, shifts),
+        || {
+            let mut pass = Pass::new(geometry, columns, sizes, weights, shifts);
+            for (f, frame) in geometry.frames.iter().enumerate() {
+                if f > 0 {
+                    pass.predict(f, frame, jumps);
+                }
+                pass.look(f, frame);
+                pass.change(f, frame);
+            }
+            pass.out.frame_rows.push(pass.out.rows.len() / columns.len());
+            pass.out
+        },
     )
 }
 
-/// `to += times · from`.
-#[inline(always)]
-fn add_times(to: &mut [f64], times: f64, from: &[f64]) {
-    let n = to.len().min(from.len());
-    let (to, from) = (&mut to[..n], &from[..n]);
-    for i in 0..n {
-        to[i] += times * from[i];
-    }
+struct Pass<'p> {
+    geometry: &'p Geometry,
+    columns: &'p [&'p [Residual]],
+    sizes: &'p Sizes,
+    weights: &'p Weights,
+    shifts: Shifts,
+    state: State,
+    update: Update,
+    /// The slot of each segment that is followed.
+    slots: Vec<usize>,
+    following: Vec<Following>,
+    /// Columns of shifts that are no longer followed.
+    spare: Vec<usize>,
+    lean: f64,
+    out: Whitened,
 }
 
-#[inline(always)]
-fn pass(
-    geometry: &Geometry,
-    columns: &[&[Residual]],
-    sizes: &Sizes,
-    weights: &Weights,
-    jumps: &[Jump],
-    shifts: Shifts,
-) -> Whitened {
-    /// A shift is followed for so many frames after its segment, or its label.
-    const AFTER: usize = 30;
-    const AFTER_LABEL: usize = 12;
-    let width = columns.len();
-    let pose = if geometry.inertial { 9 } else { 6 };
-    let first_slot = pose + JITTER;
-    let most = geometry.most_followed;
-    let stride = (first_slot + SLOT * most).next_multiple_of(8);
-    let mut state = State {
-        n: first_slot,
-        stride,
-        p: vec![0.0; stride * stride],
-        means: vec![vec![0.0; stride]; width],
-        free: (0..most).rev().map(|i| first_slot + SLOT * i).collect(),
-    };
-    let mut slots = vec![usize::MAX; geometry.segments.len()];
-    let mut out = Whitened { width, ..Whitened::default() };
-    let followed = match shifts {
-        Shifts::Nobodys => 0,
-        Shifts::Keys => geometry.segments.len(),
-        Shifts::Labels => geometry.labels.len(),
-    };
-    out.shifts = vec![Shift { own: [[0.0; 2]; 2], with: [vec![0.0; width], vec![0.0; width]] }; followed];
-    let mut following: Vec<Following> = Vec::new();
-    let mut spare: Vec<usize> = Vec::new();
-    let (mut ph, mut gain) = (vec![0.0; stride], vec![0.0; stride]);
-    let mut lean = sizes.lean_rad * sizes.lean_rad;
-    for i in 3..5 {
-        state.widen(i, lean);
-    }
-    if geometry.own_anchor {
-        state.widen(2, (2.0 * sizes.position_m).powi(2));
-    }
-    if geometry.inertial {
-        for i in 6..9 {
-            state.widen(i, START_M_S * START_M_S);
+impl<'p> Pass<'p> {
+    #[inline(always)]
+    fn new(
+        geometry: &'p Geometry,
+        columns: &'p [&'p [Residual]],
+        sizes: &'p Sizes,
+        weights: &'p Weights,
+        shifts: Shifts,
+    ) -> Self {
+        let width = columns.len();
+        let now = if geometry.inertial { 9 } else { POSE };
+        let mut state = State::new(now, geometry.most_followed, width);
+        let lean = if geometry.inertial { 0.0 } else { sizes.lean_rad * sizes.lean_rad };
+        for i in 3..5 {
+            state.widen(i, sizes.lean_rad * sizes.lean_rad);
         }
-        lean = 0.0;
-    }
-    for (f, frame) in geometry.frames.iter().enumerate() {
-        if f > 0 {
-            let dt = frame.dt_s;
-            if geometry.inertial {
-                for i in 0..3 {
-                    state.add(i, 6 + i, dt);
-                }
-                state.add(6, 4, GRAVITY_M_S2 * dt);
-                state.add(7, 3, -GRAVITY_M_S2 * dt);
-                for i in 0..3 {
-                    state.widen(i, sizes.position_m.powi(2) * dt + sizes.accel.powi(2) * dt.powi(3) / 3.0);
-                    state.widen(3 + i, sizes.gyro.powi(2) * dt);
-                    state.widen(6 + i, sizes.accel.powi(2) * dt);
-                }
-            } else {
-                state.add(0, 5, -frame.step.y);
-                state.add(1, 5, frame.step.x);
-                let keep = (-dt / LEAN_S).exp();
-                for i in 3..5 {
-                    state.scale(i, keep);
-                    state.widen(i, lean * (1.0 - keep * keep));
-                }
-                for i in 0..3 {
-                    state.widen(i, sizes.position_m.powi(2) * dt);
-                }
-                state.widen(5, sizes.yaw_rad.powi(2) * dt);
-            }
-            for jump in jumps.iter().filter(|j| (j.from..=j.to).contains(&f)) {
-                let share = 1.0 / (jump.to - jump.from + 1) as f64;
-                for i in 0..3 {
-                    state.widen(i, jump.m * jump.m * share);
-                    state.widen(3 + i, jump.rad * jump.rad * share);
-                }
-            }
-            for s in &frame.followed {
-                for i in 3..SLOT {
-                    state.widen(slots[*s] + i, sizes.walk_px.powi(2) * dt);
-                }
+        if geometry.own_anchor {
+            state.widen(2, (2.0 * sizes.position_m).powi(2));
+        }
+        if geometry.inertial {
+            for i in 6..9 {
+                state.widen(i, START_M_S * START_M_S);
             }
         }
-        state.clear(pose, JITTER);
-        for i in 0..3 {
-            state.widen(pose + i, sizes.jitter_m.powi(2));
-            state.widen(pose + 3 + i, sizes.jitter_rad.powi(2));
+        let followed = match shifts {
+            Shifts::Nobodys => 0,
+            Shifts::Keys => geometry.segments.len(),
+            Shifts::Labels => geometry.labels.len(),
+        };
+        let nothing = Shift { own: [[0.0; 2]; 2], with: [vec![0.0; width], vec![0.0; width]] };
+        let out = Whitened { width, shifts: vec![nothing; followed], ..Whitened::default() };
+        Self {
+            geometry,
+            columns,
+            sizes,
+            weights,
+            shifts,
+            update: Update::new(state.stride),
+            state,
+            slots: vec![usize::MAX; geometry.segments.len()],
+            following: Vec::new(),
+            spare: Vec::new(),
+            lean,
+            out,
         }
-        out.frame_rows.push(out.rows.len() / width);
-        let mut log_variance = 0.0;
-        for l in &frame.labels {
-            let label = &geometry.labels[*l];
-            let slot = slots[label.segment];
-            let variance = sizes.white_px.powi(2) * weights.labels[*l];
-            let mut shifted = [usize::MAX; 2];
-            if shifts == Shifts::Labels {
-                shifted = [0, 1].map(|_| another(&mut spare, &mut state.means, stride));
-                following.push(Following { of: *l, columns: shifted, until: f + AFTER_LABEL });
+    }
+
+    /// From the frame before to this one.
+    #[inline(always)]
+    fn predict(&mut self, f: usize, frame: &FrameEvents, jumps: &[Jump]) {
+        let Self { state, sizes, .. } = self;
+        let dt = frame.dt_s;
+        if self.geometry.inertial {
+            for i in 0..3 {
+                state.add(i, 6 + i, dt);
             }
-            for axis in 0..2 {
+            state.add(6, 4, GRAVITY_M_S2 * dt);
+            state.add(7, 3, -GRAVITY_M_S2 * dt);
+            for i in 0..3 {
+                state.widen(i, sizes.position_m.powi(2) * dt + sizes.accel.powi(2) * dt.powi(3) / 3.0);
+                state.widen(3 + i, sizes.gyro.powi(2) * dt);
+                state.widen(6 + i, sizes.accel.powi(2) * dt);
+            }
+        } else {
+            state.add(0, 5, -frame.step.y);
+            state.add(1, 5, frame.step.x);
+            let keep = (-dt / LEAN_S).exp();
+            for i in 3..5 {
+                state.scale(i, keep);
+                state.widen(i, self.lean * (1.0 - keep * keep));
+            }
+            for i in 0..3 {
+                state.widen(i, sizes.position_m.powi(2) * dt);
+            }
+            state.widen(5, sizes.yaw_rad.powi(2) * dt);
+        }
+        for jump in jumps.iter().filter(|j| (j.from..=j.to).contains(&f)) {
+            let share = 1.0 / (jump.to - jump.from + 1) as f64;
+            for i in 0..3 {
+                state.widen(i, jump.m * jump.m * share);
+                state.widen(3 + i, jump.rad * jump.rad * share);
+            }
+        }
+        for s in &frame.followed {
+            for i in 3..SLOT {
+                state.widen(self.slots[*s] + i, sizes.walk_px.powi(2) * dt);
+            }
+        }
+    }
+
+    /// Takes the labels of a frame in.
+    #[inline(always)]
+    fn look(&mut self, f: usize, frame: &FrameEvents) {
+        let Sizes { jitter_m: m, jitter_rad: rad, .. } = *self.sizes;
+        self.state.look([m, m, m, rad, rad, rad]);
+        self.out.frame_rows.push(self.out.rows.len() / self.out.width);
+        let mut log_variances = 0.0;
+        for labels in frame.labels.chunks(AT_ONCE) {
+            log_variances += self.take(f, labels);
+        }
+        self.out.log_variances.push(log_variances);
+    }
+
+    /// Takes some labels in; the sum of the logarithms of their variances.
+    #[inline(always)]
+    fn take(&mut self, f: usize, labels: &[usize]) -> f64 {
+        let mut rows = [Row { terms: [(0, 0.0); POSE + 4], variance: 0.0 }; 2 * AT_ONCE];
+        let rows = &mut rows[..2 * labels.len()];
+        let now = self.state.now;
+        for (l, pair) in labels.iter().zip(rows.chunks_exact_mut(2)) {
+            let label = &self.geometry.labels[*l];
+            let slot = self.slots[label.segment];
+            for (axis, row) in pair.iter_mut().enumerate() {
                 let (h, turn) = (&label.by_place[axis], &label.by_turn[axis]);
-                let mut terms = [(0, 0.0); 16];
                 for i in 0..3 {
-                    terms[i] = (i, -h[i]);
-                    terms[3 + i] = (3 + i, turn[i]);
-                    terms[6 + i] = (pose + i, -h[i]);
-                    terms[9 + i] = (pose + 3 + i, turn[i]);
-                    terms[12 + i] = (slot + i, h[i]);
+                    row.terms[i] = (now + i, -h[i]);
+                    row.terms[3 + i] = (now + 3 + i, turn[i]);
+                    row.terms[POSE + i] = (slot + i, h[i]);
                 }
-                terms[15] = (slot + 3 + axis, 1.0);
-                let n = state.n;
-                ph[..n].fill(0.0);
-                for (i, times) in terms {
-                    add_times(&mut ph[..n], times, &state.p[i * stride..i * stride + n]);
-                }
-                let mut s = variance;
-                for (i, times) in terms {
-                    s += times * ph[i];
-                }
-                log_variance += s.ln();
-                let inverse = 1.0 / s;
-                for k in 0..n {
-                    gain[k] = ph[k] * inverse;
-                }
-                for k in 0..n {
-                    add_times(&mut state.p[k * stride..k * stride + n], -gain[k], &ph[..n]);
-                }
-                let root = inverse.sqrt();
-                let first = out.rows.len();
-                for (c, mean) in state.means.iter_mut().enumerate() {
-                    let mut predicted = 0.0;
-                    for (i, times) in terms {
-                        predicted += times * mean[i];
-                    }
-                    let measured = match c {
-                        c if c < width => columns[c][*l][axis],
-                        c if c == shifted[axis] => 1.0,
-                        _ => 0.0,
-                    };
-                    let innovation = measured - predicted;
-                    if c < width {
-                        out.rows.push(innovation * root);
-                    } else if innovation == 0.0 {
-                        continue;
-                    }
-                    add_times(&mut mean[..n], innovation, &gain[..n]);
-                    // What is left of the shift's prediction is its own row, with the sign of the residuals.
-                    if c >= width {
-                        mean[stride] = innovation * root;
+                row.terms[POSE + 3] = (slot + 3 + axis, 1.0);
+                row.variance = self.sizes.white_px.powi(2) * self.weights.labels[*l];
+            }
+            if self.shifts == Shifts::Labels {
+                let columns = [0, 1].map(|_| self.another());
+                self.following.push(Following { of: *l, columns, until: f + AFTER_LABEL });
+            }
+        }
+        let log_variances = self.update.covariance(&mut self.state, rows);
+        let (width, m) = (self.out.width, rows.len());
+        let mut measured = [0.0; 2 * AT_ONCE];
+        let first = self.out.rows.len();
+        self.out.rows.resize(first + m * width, 0.0);
+        for (c, column) in self.columns.iter().enumerate() {
+            for (i, l) in labels.iter().enumerate() {
+                (measured[2 * i], measured[2 * i + 1]) = (column[*l].x, column[*l].y);
+            }
+            self.update.mean(&mut self.state.means[c], rows, &mut measured[..m]);
+            for (i, value) in measured[..m].iter().enumerate() {
+                self.out.rows[first + i * width + c] = *value;
+            }
+        }
+        for one in &self.following {
+            let mut own = [[0.0; 2 * AT_ONCE]; 2];
+            for (axis, own) in own.iter_mut().enumerate() {
+                if self.shifts == Shifts::Labels {
+                    if let Some(i) = labels.iter().position(|l| *l == one.of) {
+                        own[2 * i + axis] = 1.0;
                     }
                 }
-                for one in &following {
-                    let own = one.columns.map(|c| state.means[c][stride]);
-                    let shift = &mut out.shifts[one.of];
-                    for a in 0..2 {
-                        for b in 0..2 {
-                            shift.own[a][b] += own[a] * own[b];
-                        }
-                        for (c, sum) in shift.with[a].iter_mut().enumerate() {
-                            *sum += own[a] * out.rows[first + c];
-                        }
-                        state.means[one.columns[a]][stride] = 0.0;
+                self.update.mean(&mut self.state.means[one.columns[axis]], rows, &mut own[..m]);
+            }
+            let shift = &mut self.out.shifts[one.of];
+            for i in 0..m {
+                let whitened = &self.out.rows[first + i * width..first + (i + 1) * width];
+                for a in 0..2 {
+                    for b in 0..2 {
+                        shift.own[a][b] += own[a][i] * own[b][i];
                     }
+                    shift.with[a].iter_mut().zip(whitened).for_each(|(sum, w)| *sum += own[a][i] * w);
                 }
             }
         }
-        out.log_variances.push(log_variance);
+        log_variances
+    }
+
+    /// Segments that end and begin at a frame.
+    #[inline(always)]
+    fn change(&mut self, f: usize, frame: &FrameEvents) {
         for s in &frame.ends {
-            let slot = slots[*s];
-            state.clear(slot, SLOT);
-            state.free.push(slot);
+            let slot = self.slots[*s];
+            self.state.clear(slot, SLOT);
+            self.state.free.push(slot);
         }
+        let Self { following, spare, state, .. } = self;
         following.retain(|one| {
             let goes_on = one.until > f;
             if !goes_on {
                 spare.extend(one.columns);
-                for c in one.columns {
-                    state.means[c].fill(0.0);
-                }
+                one.columns.iter().for_each(|c| state.means[*c].fill(0.0));
             }
             goes_on
         });
         for s in &frame.begins {
-            let Some(slot) = state.free.pop() else { continue };
-            slots[*s] = slot;
-            state.n = state.n.max(slot + SLOT);
-            begin(&mut state, geometry, *s, slot, pose, sizes, weights);
-            if shifts == Shifts::Keys {
-                let mut columns = [0; 2];
-                for (a, column) in columns.iter_mut().enumerate() {
-                    let c = another(&mut spare, &mut state.means, stride);
+            let Some(slot) = self.state.free.pop() else { continue };
+            self.slots[*s] = slot;
+            self.state.n = self.state.n.max(slot + SLOT);
+            let segment = &self.geometry.segments[*s];
+            self.state.begin(segment, slot, self.sizes.white_px.powi(2) * self.weights.keys[*s]);
+            if self.shifts == Shifts::Keys {
+                let columns = [0, 1].map(|_| self.another());
+                for (a, c) in columns.into_iter().enumerate() {
                     // The filter predicts the shift's effect from here on: a residual of the opposite sign.
                     for i in 0..3 {
-                        state.means[c][slot + i] = -geometry.segments[*s].by_pixel[(i, a)];
+                        self.state.means[c][slot + i] = -segment.by_pixel[(i, a)];
                     }
-                    *column = c;
                 }
-                let until = geometry.segments[*s].last_frame + AFTER;
-                following.push(Following { of: *s, columns, until });
+                self.following.push(Following { of: *s, columns, until: segment.last_frame + AFTER });
             }
         }
     }
-    out.frame_rows.push(out.rows.len() / width);
-    out
-}
 
-/// A column of zeros, one more than the state is long: the last number is for its row.
-fn another(spare: &mut Vec<usize>, means: &mut Vec<Vec<f64>>, stride: usize) -> usize {
-    spare.pop().unwrap_or_else(|| {
-        means.push(vec![0.0; stride + 1]);
-        means.len() - 1
-    })
-}
-
-/// A key frame: the error of the point's place, from that of the pose, the label and the depth.
-fn begin(
-    state: &mut State,
-    geometry: &Geometry,
-    segment: usize,
-    slot: usize,
-    pose: usize,
-    sizes: &Sizes,
-    weights: &Weights,
-) {
-    let one = &geometry.segments[segment];
-    let (s, n) = (state.stride, state.n);
-    for i in 0..3 {
-        for m in 0..6 {
-            let times = one.by_pose[(i, m)];
-            for k in 0..n {
-                let sum = state.p[m * s + k] + state.p[(pose + m) * s + k];
-                state.p[(slot + i) * s + k] += times * sum;
-            }
-        }
-    }
-    // By now the rows of the slot hold the covariance with all others; the block of the slot itself comes from them.
-    let mut block = [[0.0; 3]; 3];
-    for i in 0..3 {
-        for j in 0..3 {
-            block[i][j] = (0..6)
-                .map(|m| {
-                    one.by_pose[(j, m)] * (state.p[(slot + i) * s + m] + state.p[(slot + i) * s + pose + m])
-                })
-                .sum();
-        }
-    }
-    let variance = sizes.white_px.powi(2) * weights.keys[segment];
-    for i in 0..3 {
-        for j in 0..3 {
-            let label: f64 = (0..2).map(|a| one.by_pixel[(i, a)] * one.by_pixel[(j, a)]).sum();
-            block[i][j] += variance * label + one.depth_variance[(i, j)];
-        }
-    }
-    for i in 0..3 {
-        for k in 0..n {
-            state.p[k * s + slot + i] = state.p[(slot + i) * s + k];
-        }
-    }
-    for i in 0..3 {
-        for j in 0..3 {
-            state.p[(slot + i) * s + slot + j] = block[i][j];
-        }
-    }
-    for mean in &mut state.means {
-        for i in 0..3 {
-            mean[slot + i] = (0..6).map(|m| one.by_pose[(i, m)] * (mean[m] + mean[pose + m])).sum();
-        }
+    /// A column of zeros.
+    fn another(&mut self) -> usize {
+        let means = &mut self.state.means;
+        self.spare.pop().unwrap_or_else(|| {
+            means.push(vec![0.0; self.state.stride]);
+            means.len() - 1
+        })
     }
 }
 
