@@ -8,9 +8,12 @@
 mod state;
 mod update;
 
+use pulp::{Simd, WithSimd};
+
 use super::geometry::{FrameEvents, Geometry};
 use super::noise::Sizes;
 use super::scene::Residual;
+use crate::lanes::ARCH;
 use state::{POSE, SLOT, State};
 use update::{AT_ONCE, Row, Update};
 
@@ -92,21 +95,36 @@ pub(super) fn whiten(
     shifts: Shifts,
 ) -> Whitened {
     // The same sums in the same order, with the widest registers that there are.
-    pulp::Arch::new().dispatch(
-        #[inline(always)]
-        || {
-            let mut pass = Pass::new(geometry, columns, sizes, weights, shifts);
-            for (f, frame) in geometry.frames.iter().enumerate() {
-                if f > 0 {
-                    pass.predict(f, frame, jumps);
-                }
-                pass.look(f, frame);
-                pass.change(f, frame);
+    ARCH.dispatch(Whiten { geometry, columns, sizes, weights, jumps, shifts })
+}
+
+/// All that it calls is inlined, and its loops hold no closures: what is not inlined is compiled for the smallest
+/// instruction set.
+struct Whiten<'p> {
+    geometry: &'p Geometry,
+    columns: &'p [&'p [Residual]],
+    sizes: &'p Sizes,
+    weights: &'p Weights,
+    jumps: &'p [Jump],
+    shifts: Shifts,
+}
+
+impl WithSimd for Whiten<'_> {
+    type Output = Whitened;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Whitened {
+        let mut pass = Pass::new(self.geometry, self.columns, self.sizes, self.weights, self.shifts);
+        for (f, frame) in self.geometry.frames.iter().enumerate() {
+            if f > 0 {
+                pass.predict(f, frame, self.jumps);
             }
-            pass.out.frame_rows.push(pass.out.rows.len() / columns.len());
-            pass.out
-        },
-    )
+            pass.look(simd, f, frame);
+            pass.change(f, frame);
+        }
+        pass.out.frame_rows.push(pass.out.rows.len() / self.columns.len());
+        pass.out
+    }
 }
 
 struct Pass<'p> {
@@ -218,20 +236,20 @@ impl<'p> Pass<'p> {
 
     /// Takes the labels of a frame in.
     #[inline(always)]
-    fn look(&mut self, f: usize, frame: &FrameEvents) {
+    fn look<S: Simd>(&mut self, simd: S, f: usize, frame: &FrameEvents) {
         let Sizes { jitter_m: m, jitter_rad: rad, .. } = *self.sizes;
         self.state.look([m, m, m, rad, rad, rad]);
         self.out.frame_rows.push(self.out.rows.len() / self.out.width);
         let mut log_variances = 0.0;
         for labels in frame.labels.chunks(AT_ONCE) {
-            log_variances += self.take(f, labels);
+            log_variances += self.take(simd, f, labels);
         }
         self.out.log_variances.push(log_variances);
     }
 
     /// Takes some labels in; the sum of the logarithms of their variances.
     #[inline(always)]
-    fn take(&mut self, f: usize, labels: &[usize]) -> f64 {
+    fn take<S: Simd>(&mut self, simd: S, f: usize, labels: &[usize]) -> f64 {
         let mut rows = [Row { terms: [(0, 0.0); POSE + 4], variance: 0.0 }; 2 * AT_ONCE];
         let rows = &mut rows[..2 * labels.len()];
         let now = self.state.now;
@@ -253,7 +271,7 @@ impl<'p> Pass<'p> {
                 self.following.push(Following { of: *l, columns, until: f + AFTER_LABEL });
             }
         }
-        let log_variances = self.update.covariance(&mut self.state, rows);
+        let log_variances = self.update.covariance(simd, &mut self.state, rows);
         let (width, m) = (self.out.width, rows.len());
         let mut measured = [0.0; 2 * AT_ONCE];
         let first = self.out.rows.len();

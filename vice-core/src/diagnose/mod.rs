@@ -33,6 +33,7 @@ mod starts;
 mod theta;
 mod verdict;
 mod view;
+mod width;
 mod words;
 
 pub use document::{
@@ -61,6 +62,11 @@ use crate::evaluate::{EvaluateError, Evaluation};
 /// Of more points than these at once some are left out: the cost grows with their square, and what all points of a frame
 /// share is known from these.
 const MOST_POINTS: usize = 10;
+
+/// A convention must be likelier than what was read by this times the root of the number of labels, as a logarithm, where
+/// both may wander. Of a cart on a plane the mirror turns the sign of the errors of height, roll and pitch and of nothing
+/// else: which sign is likelier is chance, with a deviation of twice the root of what the labels show of these errors.
+const BETTER_THAN_WANDER: f64 = 10.0;
 
 /// Why nothing could be diagnosed.
 #[derive(Debug, thiserror::Error)]
@@ -210,8 +216,23 @@ fn conventions<'a>(
     }
     let likelier = (all[0].unlikely).min(by_flaw + unusual) - all[1].unlikely;
     let best = all.swap_remove(1);
-    let motion = Motion { poses: best.motion, id: 1_000, ..as_read };
+    let motion = Motion { poses: best.motion, id: 1_000, ..as_read.clone() };
+    // What an odometry that wanders explains as well is no other convention.
+    let noise = NoiseModel { odometry: diagnosis.options.odometry_noise, inertial: false };
+    let by_wander = as_healthy(scene, &motion, noise)? - as_healthy(scene, &as_read, noise)?;
+    if by_wander < BETTER_THAN_WANDER * (scene.labels.len() as f64).sqrt() {
+        return Ok((as_read, nothing));
+    }
     Ok((motion, Gross { conventions: best.conventions, likelier, ..nothing }))
+}
+
+/// How likely the labels are with poses that only wander, as a logarithm.
+fn as_healthy<'a>(scene: &Scene<'a>, motion: &Motion<'a>, noise: NoiseModel) -> Result<f64, DiagnoseError> {
+    let zero = Theta::zero();
+    let mut work = Work::new(scene, motion, noise, &zero)?;
+    work.weights = outliers::by_neighbours(&work, &work.residuals(&zero)?);
+    let fit = work.newton(&[], &zero, &[0.0; 6], &[], 0)?;
+    Ok(work.sized(fit, 4).score)
 }
 
 /// The least robust cost that any flaw alone leaves of the poses as they were read.

@@ -7,17 +7,8 @@ use super::fit::{Fit, Work};
 use super::flaw::{Flaw, PARAMETERS};
 use super::search::{Ranked, Search};
 use super::verdict::{decide, rank, share};
-use super::{Diagnosed, Diagnosis, Gross, Prepared, words};
+use super::{Diagnosed, Diagnosis, Gross, Prepared, width, words};
 
-/// Half the width of a 95 % interval in posterior deviations: the sizes of the noise are estimated, and the model is no
-/// truth.
-const HALF_WIDTH: f64 = 2.5;
-/// Errors of a tilt were measured at up to 5.4 deviations over five flights: an integration errs by more than white noise.
-const HALF_WIDTH_TILT: f64 = 6.0;
-/// At constant speed a clock and a position are nearly one.
-const HALF_WIDTH_CLOCK: f64 = 3.0;
-/// A drift and the slope of a walk are one.
-const HALF_WIDTH_DRIFT: f64 = 3.2;
 /// So many hypotheses are listed.
 const MOST_HYPOTHESES: usize = 8;
 /// An overlap that is worth a word.
@@ -141,15 +132,6 @@ fn odometry(work: &Work<'_, '_>, best: &Fit) -> OdometryPart {
     }
 }
 
-fn half_width(flaw: Flaw) -> f64 {
-    match flaw {
-        Flaw::InitialTilt => HALF_WIDTH_TILT,
-        Flaw::Drift => HALF_WIDTH_DRIFT,
-        Flaw::ClockOffset | Flaw::ClockRate | Flaw::ClockStep => HALF_WIDTH_CLOCK,
-        _ => HALF_WIDTH,
-    }
-}
-
 pub(super) struct Reporter<'r, 's, 'a> {
     pub(super) work: &'r Work<'s, 'a>,
     pub(super) prepared: &'r Prepared<'a>,
@@ -194,45 +176,17 @@ impl Reporter<'_, '_, '_> {
     /// What one flaw of a fit comes to.
     pub(super) fn part(&self, fit: &Fit, flaw: Flaw) -> FlawPart {
         let values = fit.values();
-        let deviation = |parameter: usize| {
-            fit.parameters
-                .iter()
-                .position(|p| *p == parameter)
-                .map_or(0.0, |i| fit.solution.covariance[(i, i)].max(0.0).sqrt())
-        };
         let parameters: Vec<Estimated> = flaw
             .parameters()
             .map(|p| {
-                let half = half_width(flaw) * deviation(p);
-                let value = values[p];
-                Estimated {
-                    name: PARAMETERS[p].name.to_string(),
-                    value,
-                    low: value - half,
-                    high: value + half,
-                }
+                let (value, half) = (values[p], width::half(fit, flaw, p));
+                let name = PARAMETERS[p].name.to_string();
+                Estimated { name, value, low: value - half, high: value + half }
             })
             .collect();
-        // The yaw rate of a drift is of another unit than its velocity.
-        let vector = if flaw == Flaw::Drift { 3 } else { flaw.solved().len() };
-        let is_vector = matches!(
-            flaw,
-            Flaw::ExtrinsicRotation | Flaw::ExtrinsicTranslation | Flaw::InitialTilt | Flaw::Drift
-        );
-        let size = is_vector.then(|| {
-            let first = flaw.parameters().start;
-            let x: Vec<f64> = (0..vector).map(|i| values[first + i]).collect();
-            let length = x.iter().map(|v| v * v).sum::<f64>().sqrt();
-            let at = |p: usize| fit.parameters.iter().position(|q| *q == first + p).unwrap_or(0);
-            let mut variance = 0.0;
-            for a in 0..vector {
-                for b in 0..vector {
-                    variance += x[a] * x[b] * fit.solution.covariance[(at(a), at(b))];
-                }
-            }
-            let half = half_width(flaw) * variance.max(0.0).sqrt() / length.max(1e-12);
-            let name = PARAMETERS[first].name.replacen("_x", "", 1);
-            Estimated { name, value: length, low: (length - half).max(0.0), high: length + half }
+        let size = width::length(fit, flaw).map(|(value, half)| {
+            let name = PARAMETERS[flaw.parameters().start].name.replacen("_x", "", 1);
+            Estimated { name, value, low: (value - half).max(0.0), high: value + half }
         });
         let none = self.search.ranked.iter().find(|r| r.fit.flaws.is_empty());
         let rmse_px = self.left_px(fit);

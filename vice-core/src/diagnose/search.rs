@@ -19,9 +19,11 @@ const CLOSE: f64 = 60.0;
 const CLOSE_FOR_JUMPS: f64 = 40.0;
 /// Pairs this close to the best hypothesis are fitted in full, and at most so many.
 const CLOSE_PAIR: f64 = 12.0;
-const MOST_PAIRS: usize = 5;
+const MOST_PAIRS: usize = 6;
 /// A flaw more must be nearer by this, as a logarithm of a robust likelihood.
 const NEARER: f64 = 1.5;
+/// A fit that leaves more than this share of what another leaves is in the same valley.
+const SAME_VALLEY: f64 = 0.95;
 /// Prior of no flaw, of one, of two.
 const NONE: f64 = 0.35;
 const ONE: f64 = 0.5;
@@ -83,8 +85,9 @@ pub(super) fn search(
         fits = again(work, fits, 3);
     }
     progress(1, steps);
-    let second = pairs(work, &fits, flaws, 3, false);
+    let second = pairs(work, &fits, flaws, &[], 3, false);
     fits.extend(second);
+    fits = alone(work, fits, false);
     let nearest = self::nearest(&fits, work.scene.labels.len()).clone();
     if nearest.flaws.len() == 2 {
         move_to(work, &nearest.values())?;
@@ -98,7 +101,7 @@ pub(super) fn search(
     // Once more, now that the noise is known.
     let best = best_of(&fits);
     work.weights = outliers::find(work, &fits[best]);
-    fits.retain(|f| f.flaws.len() < 2);
+    let before: Vec<Fit> = fits.extract_if(.., |f| f.flaws.len() > 1).collect();
     fits = again(work, fits, 1);
     fits = sized(work, fits);
     let close = best_score(&fits) - CLOSE_FOR_JUMPS;
@@ -107,8 +110,9 @@ pub(super) fn search(
         .map(|fit| if fit.score > close { work.with_jumps(fit, MOST_JUMPS) } else { fit })
         .collect();
     progress(4, steps);
-    let pairs = pairs(work, &fits, flaws, MOST_PAIRS, true);
+    let pairs = pairs(work, &fits, flaws, &before, MOST_PAIRS, true);
     fits.extend(pairs);
+    fits = alone(work, fits, true);
     progress(steps, steps);
     let mut ranked: Vec<Ranked> = fits
         .into_iter()
@@ -237,41 +241,72 @@ fn sized(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
     fits.into_par_iter().map(|fit| if fit.score > limit { work.sized(fit, 1) } else { fit }).collect()
 }
 
-/// The second flaws that matter, beside the three best.
-fn pairs(work: &Work<'_, '_>, fits: &[Fit], flaws: &[Flaw], most_pairs: usize, in_full: bool) -> Vec<Fit> {
-    let mut order: Vec<usize> = (0..fits.len()).filter(|i| fits[*i].flaws.len() == 1).collect();
-    order.sort_by(|a, b| fits[*b].score.total_cmp(&fits[*a].score));
-    let best = best_score(fits);
-    let looked: Vec<(f64, Vec<Flaw>, usize)> = order
+/// Flaws of pairs by themselves, once more from the values that they have in the pair: from where no flaw is known the way
+/// may lead into another valley.
+fn alone(work: &Work<'_, '_>, fits: Vec<Fit>, in_full: bool) -> Vec<Fit> {
+    let pairs: Vec<&Fit> = fits.iter().filter(|f| f.flaws.len() == 2).collect();
+    let best = pairs.iter().map(|f| f.score).fold(f64::NEG_INFINITY, f64::max);
+    let tries: Vec<(&Fit, Flaw)> = pairs
         .into_iter()
-        .take(3)
-        .collect::<Vec<_>>()
+        .filter(|pair| pair.score > best - CLOSE_PAIR)
+        .flat_map(|pair| pair.flaws.iter().map(move |flaw| (pair, *flaw)))
+        .collect();
+    let found: Vec<Fit> = tries
         .into_par_iter()
-        .flat_map(|i| {
-            second_flaws(work, &fits[i], flaws).into_iter().map(|(s, set)| (s, set, i)).collect::<Vec<_>>()
+        .filter_map(|(pair, flaw)| {
+            let from = Theta::zero().with(flaw, pair.values().of(flaw));
+            let fit = work.newton(&[flaw], &from, &pair.logs, &[], 3).ok()?;
+            let known = fits.iter().find(|f| f.flaws == [flaw])?;
+            let left = |fit: &Fit| robust_cost(&fit.residuals_now());
+            if left(&fit) > SAME_VALLEY * left(known) {
+                return None;
+            }
+            if !in_full {
+                return Some(fit);
+            }
+            Some(work.with_jumps(work.sized(fit, 2), MOST_JUMPS))
         })
         .collect();
-    let mut looked = looked;
-    looked.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut chosen: Vec<(Vec<Flaw>, usize)> = Vec::new();
-    let most = looked.first().map_or(best, |l| l.0.max(best));
-    for (score, set, i) in looked {
-        let mut sorted = set.clone();
-        sorted.sort_unstable();
-        let known = chosen.iter().any(|(other, _)| {
-            let mut other = other.clone();
-            other.sort_unstable();
-            other == sorted
-        });
-        if score > most - CLOSE_PAIR && !known && chosen.len() < most_pairs {
-            chosen.push((set, i));
+    let mut fits = fits;
+    for one in found {
+        match fits.iter_mut().find(|f| f.flaws == one.flaws) {
+            Some(known) if one.score > known.score => *known = one,
+            _ => {}
         }
     }
+    fits
+}
+
+/// The second flaws that matter, beside the three best, and pairs that were good `before`.
+fn pairs(
+    work: &Work<'_, '_>,
+    fits: &[Fit],
+    flaws: &[Flaw],
+    before: &[Fit],
+    most_pairs: usize,
+    in_full: bool,
+) -> Vec<Fit> {
+    let mut order: Vec<usize> = (0..fits.len()).filter(|i| fits[*i].flaws.len() == 1).collect();
+    order.sort_by(|a, b| fits[*b].score.total_cmp(&fits[*a].score));
+    order.truncate(3);
+    let mut looked: Vec<(f64, Start)> =
+        order.into_par_iter().flat_map_iter(|i| second_flaws(work, &fits[i], flaws).into_iter()).collect();
+    looked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let most = looked.first().map_or_else(|| best_score(fits), |l| l.0.max(best_score(fits)));
+    let close = looked.into_iter().filter(|l| l.0 > most - CLOSE_PAIR).map(|l| l.1).take(2 * most_pairs);
+    // Sizes of the noise that a wrong flaw needs hide what is beside it: sizes are the pair's own.
+    let known = before.iter().map(|f| Start { set: f.flaws.clone(), from: f.values(), logs: f.logs });
+    let mut chosen: Vec<Start> = Vec::new();
+    for start in known.chain(close) {
+        if !chosen.iter().any(|other| start.set.iter().all(|f| other.set.contains(f))) {
+            chosen.push(start);
+        }
+    }
+    chosen.truncate(most_pairs);
     chosen
         .into_par_iter()
-        .filter_map(|(set, i)| {
-            let of = &fits[i];
-            let fit = work.newton(&set, &of.values(), &of.logs, &[], 3).ok()?;
+        .filter_map(|start| {
+            let fit = work.newton(&start.set, &start.from, &start.logs, &[], 3).ok()?;
             if !in_full {
                 return Some(fit);
             }
@@ -281,8 +316,15 @@ fn pairs(work: &Work<'_, '_>, fits: &[Fit], flaws: &[Flaw], most_pairs: usize, i
         .collect()
 }
 
+/// Where the fit of a pair begins.
+struct Start {
+    set: Vec<Flaw>,
+    from: Theta,
+    logs: Logs,
+}
+
 /// Each second flaw beside a fit, by columns of one pass: how likely the pair is at least.
-fn second_flaws(work: &Work<'_, '_>, fit: &Fit, flaws: &[Flaw]) -> Vec<(f64, Vec<Flaw>)> {
+fn second_flaws(work: &Work<'_, '_>, fit: &Fit, flaws: &[Flaw]) -> Vec<(f64, Start)> {
     let others: Vec<Flaw> =
         flaws.iter().copied().filter(|f| !fit.flaws.contains(f) && *f != Flaw::ClockStep).collect();
     let added = parameters_of(&others);
@@ -305,7 +347,8 @@ fn second_flaws(work: &Work<'_, '_>, fit: &Fit, flaws: &[Flaw]) -> Vec<(f64, Vec
             let values: Vec<f64> = parameters.iter().map(|p| theta[*p]).collect();
             let solution = Normal::of(&whitened, &columns).solve(&values, &expected_of(&parameters));
             let set: Vec<Flaw> = fit.flaws.iter().copied().chain([flaw]).collect();
-            (fit.score - fit.solution.evidence + solution.evidence, set)
+            let start = Start { set, from: fit.values(), logs: fit.logs };
+            (fit.score - fit.solution.evidence + solution.evidence, start)
         })
         .collect()
 }

@@ -4,6 +4,7 @@ use super::fit::Fit;
 use super::flaw::{Flaw, PARAMETERS};
 use super::noise::{NoiseModel, POSITION, YAW};
 use super::search::{Ranked, Search};
+use super::width::shows;
 
 /// A name needs this share of all hypotheses ...
 const SURE: f64 = 0.88;
@@ -19,6 +20,8 @@ const HARDLY_LESS: f64 = 0.9;
 const USUAL_TIMES: f64 = 4.5;
 /// A second flaw must add this, as a logarithm.
 const SECOND: f64 = 20.0;
+/// ... and bring what is left to less than this.
+const NEARER_WITH_SECOND: f64 = 0.97;
 /// No flaw is said where it has this share of the hypotheses.
 const NONE: f64 = 0.3;
 /// Beyond these times the expected walk an odometry is not healthy.
@@ -127,19 +130,20 @@ pub(super) fn decide(
 }
 
 /// The flaws that are named: the best hypothesis, or without a second flaw that adds little to it. A small gain may ride on
-/// an outlier that nobody found, so that it makes no name; it is no doubt of the first one either.
+/// an outlier that nobody found, so that it makes no name; it is no doubt of the first one either. A second flaw that may
+/// be zero, or that brings the key points no nearer to their labels, is none.
 fn core(search: &Search) -> Option<Vec<Flaw>> {
     let best = &search.ranked[0].fit;
     let mut core = best;
     if best.flaws.len() == 2 {
-        let single = search
-            .ranked
-            .iter()
-            .map(|r| &r.fit)
-            .filter(|f| f.flaws.len() == 1 && best.flaws.contains(&f.flaws[0]))
-            .max_by(|a, b| a.score.total_cmp(&b.score))?;
-        if best.score - single.score < SECOND {
-            core = single;
+        let single = |flaw: Flaw| search.ranked.iter().map(|r| &r.fit).find(|f| f.flaws == [flaw]);
+        let shown: Vec<Flaw> = best.flaws.iter().copied().filter(|f| shows(best, *f)).collect();
+        let first = shown.iter().filter_map(|f| single(*f)).max_by(|a, b| a.score.total_cmp(&b.score))?;
+        let is_second = shown.len() == 2
+            && best.score - first.score >= SECOND
+            && usual_rms(best) < NEARER_WITH_SECOND * usual_rms(first);
+        if !is_second {
+            core = first;
         }
     }
     let with: f64 = search
@@ -171,6 +175,14 @@ fn rivals<'s>(search: &'s Search, of: &Fit) -> Vec<&'s Fit> {
                 && fits_at_best(fit) > limit
         })
         .collect()
+}
+
+/// RMS length of what a fit leaves of the nearer nine tenths of the labels, pixels: blunders are no measure of it.
+fn usual_rms(fit: &Fit) -> f64 {
+    let mut squares: Vec<f64> = fit.residuals_now().iter().map(|r| r.norm_squared()).collect();
+    squares.sort_by(f64::total_cmp);
+    squares.truncate((squares.len() * 9).div_ceil(10));
+    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
 
 /// How many times as many labels it takes until a direction of some flaw shows; 1 or less where one does.

@@ -23,7 +23,7 @@ use std::sync::LazyLock;
 use pulp::{Arch, Simd, WithSimd};
 
 /// Found once: asking the processor for each batch would cost more than a small batch does.
-static ARCH: LazyLock<Arch> = LazyLock::new(Arch::new);
+pub(crate) static ARCH: LazyLock<Arch> = LazyLock::new(Arch::new);
 
 /// The instruction set that batches run with, and how many doubles it works on at a time, such as `V4, 8 doubles`.
 ///

@@ -1,5 +1,7 @@
 //! The state of the pass: its covariance and one mean for each column.
 
+#![expect(clippy::needless_range_loop, reason = "indices of matrices are clearer as indices")]
+
 use super::super::geometry::SegmentAnswer;
 
 /// Numbers of a followed point: its place and the walk of its label.
@@ -40,13 +42,16 @@ impl State {
         }
     }
 
+    #[inline(always)]
     pub(super) fn clear(&mut self, at: usize, count: usize) {
         for i in at..at + count {
             for k in 0..self.stride {
                 self.p[i * self.stride + k] = 0.0;
                 self.p[k * self.stride + i] = 0.0;
             }
-            self.means.iter_mut().for_each(|m| m[i] = 0.0);
+            for mean in &mut self.means {
+                mean[i] = 0.0;
+            }
         }
     }
 
@@ -60,7 +65,9 @@ impl State {
         for k in 0..self.n {
             self.p[k * s + to] += times * self.p[k * s + from];
         }
-        self.means.iter_mut().for_each(|m| m[to] += times * m[from]);
+        for mean in &mut self.means {
+            mean[to] += times * mean[from];
+        }
     }
 
     #[inline(always)]
@@ -72,7 +79,9 @@ impl State {
         for k in 0..self.n {
             self.p[k * s + at] *= times;
         }
-        self.means.iter_mut().for_each(|m| m[at] *= times);
+        for mean in &mut self.means {
+            mean[at] *= times;
+        }
     }
 
     #[inline(always)]
@@ -84,17 +93,23 @@ impl State {
     #[inline(always)]
     pub(super) fn look(&mut self, jitter: [f64; POSE]) {
         let (s, now) = (self.stride, self.now);
+        let (before, after) = self.p.split_at_mut(now * s);
+        after[..POSE * s].copy_from_slice(&before[..POSE * s]);
+        for row in self.p.chunks_exact_mut(s).take(self.n) {
+            let (before, after) = row.split_at_mut(now);
+            for i in 0..POSE {
+                after[i] = before[i];
+            }
+        }
         for i in 0..POSE {
-            self.p.copy_within(i * s..i * s + self.n, (now + i) * s);
+            self.widen(now + i, jitter[i] * jitter[i]);
         }
-        for k in 0..self.n {
-            let row = &mut self.p[k * s..k * s + self.n];
-            row.copy_within(..POSE, now);
+        for mean in &mut self.means {
+            let (before, after) = mean.split_at_mut(now);
+            for i in 0..POSE {
+                after[i] = before[i];
+            }
         }
-        for (i, jitter) in jitter.into_iter().enumerate() {
-            self.widen(now + i, jitter * jitter);
-        }
-        self.means.iter_mut().for_each(|m| m.copy_within(..POSE, now));
     }
 
     /// A key frame: the error of the point's place, from that of the pose, the label (of this variance) and the depth.

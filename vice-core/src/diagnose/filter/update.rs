@@ -3,12 +3,16 @@
 
 #![expect(clippy::needless_range_loop, reason = "indices of matrices are clearer as indices")]
 
-use super::state::{LANES, POSE, State};
+use pulp::Simd;
+
+use super::state::{POSE, State};
 
 /// Labels that are taken in at once.
 pub(super) const AT_ONCE: usize = 8;
 const ROWS: usize = 2 * AT_ONCE;
 const TERMS: usize = POSE + 4;
+/// Registers of a row of the covariance that are worked on at a time.
+const REGISTERS: usize = 4;
 
 /// One coordinate of a label: how it answers to the state, and its variance.
 #[derive(Clone, Copy, Debug)]
@@ -34,15 +38,11 @@ impl Update {
 
     /// Takes rows into the covariance; the sum of the logarithms of their variances, each given those before it.
     #[inline(always)]
-    pub(super) fn covariance(&mut self, state: &mut State, rows: &[Row]) -> f64 {
+    pub(super) fn covariance<S: Simd>(&mut self, simd: S, state: &mut State, rows: &[Row]) -> f64 {
         let (s, n) = (self.stride, state.n);
         let m = rows.len();
         for (row, out) in rows.iter().zip(self.rows.chunks_exact_mut(s)) {
-            let out = &mut out[..n];
-            out.fill(0.0);
-            for (i, times) in row.terms {
-                add_times(out, times, &state.p[i * s..i * s + n]);
-            }
+            sum_of_rows(simd, row, &state.p, out, n);
         }
         let mut log_variances = 0.0;
         for a in 0..m {
@@ -79,38 +79,60 @@ impl Update {
                 add_times(row, -self.lower[a][b], &before[b * s..b * s + n]);
             }
             let inverse = self.inverse[a];
-            row.iter_mut().for_each(|v| *v *= inverse);
+            for value in row {
+                *value *= inverse;
+            }
             rest[n..s].fill(0.0);
         }
-        self.subtract(&mut state.p, n, m);
+        self.subtract(simd, &mut state.p, n, m);
         log_variances
     }
 
-    /// `p -= rowsᵀ · rows`, two rows of the covariance at a time.
+    /// `p -= rowsᵀ · rows`, two rows of the covariance and some registers at a time.
     #[inline(always)]
-    fn subtract(&self, p: &mut [f64], n: usize, m: usize) {
+    fn subtract<S: Simd>(&self, simd: S, p: &mut [f64], n: usize, m: usize) {
         let s = self.stride;
-        let end = n.next_multiple_of(LANES);
+        let end = n.div_ceil(S::F64_LANES);
         for (k, pair) in p.chunks_exact_mut(2 * s).take(n.div_ceil(2)).enumerate() {
             let (first, second) = pair.split_at_mut(s);
+            let (first, _) = S::as_mut_simd_f64s(first);
+            let (second, _) = S::as_mut_simd_f64s(second);
             let mut at = 0;
+            while at + REGISTERS <= end {
+                self.subtract_some::<S, REGISTERS>(simd, k, at, m, first, second);
+                at += REGISTERS;
+            }
             while at < end {
-                let (mut one, mut two) = ([0.0; LANES], [0.0; LANES]);
-                one.copy_from_slice(&first[at..at + LANES]);
-                two.copy_from_slice(&second[at..at + LANES]);
-                for row in self.rows.chunks_exact(s).take(m) {
-                    let (a, b) = (row[2 * k], row[2 * k + 1]);
-                    let with = &row[at..at + LANES];
-                    for i in 0..LANES {
-                        one[i] -= a * with[i];
-                        two[i] -= b * with[i];
-                    }
-                }
-                first[at..at + LANES].copy_from_slice(&one);
-                second[at..at + LANES].copy_from_slice(&two);
-                at += LANES;
+                self.subtract_some::<S, 1>(simd, k, at, m, first, second);
+                at += 1;
             }
         }
+    }
+
+    #[inline(always)]
+    fn subtract_some<S: Simd, const N: usize>(
+        &self,
+        simd: S,
+        k: usize,
+        at: usize,
+        m: usize,
+        first: &mut [S::f64s],
+        second: &mut [S::f64s],
+    ) {
+        let (mut one, mut two) = ([simd.splat_f64s(0.0); N], [simd.splat_f64s(0.0); N]);
+        one.copy_from_slice(&first[at..at + N]);
+        two.copy_from_slice(&second[at..at + N]);
+        for row in self.rows.chunks_exact(self.stride).take(m) {
+            let (a, b) = (simd.splat_f64s(row[2 * k]), simd.splat_f64s(row[2 * k + 1]));
+            let (row, _) = S::as_simd_f64s(row);
+            let with = &row[at..at + N];
+            for i in 0..N {
+                one[i] = simd.sub_f64s(one[i], simd.mul_f64s(a, with[i]));
+                two[i] = simd.sub_f64s(two[i], simd.mul_f64s(b, with[i]));
+            }
+        }
+        first[at..at + N].copy_from_slice(&one);
+        second[at..at + N].copy_from_slice(&two);
     }
 
     /// Takes the measured rows of one column into its mean; they become independent, of unit variance.
@@ -132,6 +154,25 @@ impl Update {
         for (value, row) in measured.iter().zip(self.rows.chunks_exact(s)) {
             add_times(&mut mean[..s], *value, &row[..s]);
         }
+    }
+}
+
+/// `out = Σ times · p[row]`, so many numbers of it.
+#[inline(always)]
+fn sum_of_rows<S: Simd>(simd: S, row: &Row, p: &[f64], out: &mut [f64], n: usize) {
+    let s = out.len();
+    let (out, _) = S::as_mut_simd_f64s(out);
+    let end = n.div_ceil(S::F64_LANES);
+    let mut at = 0;
+    while at < end {
+        let mut sum = simd.splat_f64s(0.0);
+        for t in 0..TERMS {
+            let (i, times) = row.terms[t];
+            let (from, _) = S::as_simd_f64s(&p[i * s..(i + 1) * s]);
+            sum = simd.add_f64s(sum, simd.mul_f64s(simd.splat_f64s(times), from[at]));
+        }
+        out[at] = sum;
+        at += 1;
     }
 }
 

@@ -1,0 +1,67 @@
+//! How wide the interval of a fitted value is, and whether it holds zero.
+
+use super::fit::Fit;
+use super::flaw::Flaw;
+
+/// Half the width of a 95 % interval in posterior deviations: the sizes of the noise are estimated, and the model is no
+/// truth.
+const HALF_WIDTH: f64 = 2.5;
+/// Errors of a tilt were measured at up to 5.4 deviations over five flights: an integration errs by more than white noise.
+const HALF_WIDTH_TILT: f64 = 6.0;
+/// At constant speed a clock and a position are nearly one.
+const HALF_WIDTH_CLOCK: f64 = 3.0;
+/// A drift and the slope of a walk are one.
+const HALF_WIDTH_DRIFT: f64 = 3.2;
+
+/// In posterior deviations.
+fn half_width(flaw: Flaw) -> f64 {
+    match flaw {
+        Flaw::InitialTilt => HALF_WIDTH_TILT,
+        Flaw::Drift => HALF_WIDTH_DRIFT,
+        Flaw::ClockOffset | Flaw::ClockRate | Flaw::ClockStep => HALF_WIDTH_CLOCK,
+        _ => HALF_WIDTH,
+    }
+}
+
+fn place(fit: &Fit, parameter: usize) -> Option<usize> {
+    fit.parameters.iter().position(|p| *p == parameter)
+}
+
+/// Half the width of the interval of one parameter; zero if it is not solved for.
+pub(super) fn half(fit: &Fit, flaw: Flaw, parameter: usize) -> f64 {
+    let variance = place(fit, parameter).map_or(0.0, |i| fit.solution.covariance[(i, i)].max(0.0));
+    half_width(flaw) * variance.sqrt()
+}
+
+/// The length of a flaw that is a vector, and half the width of its interval.
+pub(super) fn length(fit: &Fit, flaw: Flaw) -> Option<(f64, f64)> {
+    // The yaw rate of a drift is of another unit than its velocity.
+    let numbers = match flaw {
+        Flaw::ExtrinsicRotation | Flaw::ExtrinsicTranslation | Flaw::Drift => 3,
+        Flaw::InitialTilt => 2,
+        _ => return None,
+    };
+    let first = flaw.parameters().start;
+    let places: Vec<usize> = (first..first + numbers).map(|p| place(fit, p)).collect::<Option<_>>()?;
+    let values = fit.values();
+    let x: Vec<f64> = (0..numbers).map(|i| values[first + i]).collect();
+    let length = x.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let mut variance = 0.0;
+    for (a, i) in places.iter().enumerate() {
+        for (b, j) in places.iter().enumerate() {
+            variance += x[a] * x[b] * fit.solution.covariance[(*i, *j)];
+        }
+    }
+    Some((length, half_width(flaw) * variance.max(0.0).sqrt() / length.max(1e-12)))
+}
+
+/// Whether a flaw of a fit is more than nothing: the interval of its length, or of one of its numbers, does not hold zero.
+pub(super) fn shows(fit: &Fit, flaw: Flaw) -> bool {
+    let values = fit.values();
+    let beyond = |parameter: usize| values[parameter].abs() > half(fit, flaw, parameter);
+    match length(fit, flaw) {
+        // Of a drift the yaw rate is a number beside the velocity.
+        Some((length, half)) => length > half || (flaw == Flaw::Drift && beyond(flaw.parameters().end - 1)),
+        None => flaw.solved().any(beyond),
+    }
+}
