@@ -24,6 +24,8 @@ const MOST_PAIRS: usize = 6;
 const NEARER: f64 = 1.5;
 /// A fit that leaves more than this share of what another leaves is in the same valley.
 const SAME_VALLEY: f64 = 0.95;
+/// A flaw that changes the likelihood by less than this changes no size of the noise.
+const BESIDE: f64 = 5.0;
 /// Prior of no flaw, of one, of two.
 const NONE: f64 = 0.35;
 const ONE: f64 = 0.5;
@@ -227,18 +229,33 @@ fn sized(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
     let best = best_of(&fits);
     let first = work.sized(fits[best].clone(), 2);
     let limit = first.score - CLOSE;
-    let fits: Vec<Fit> = fits
+    let mut fits: Vec<Fit> = fits
         .into_par_iter()
         .enumerate()
-        .map(|(i, fit)| match i == best {
-            true => first.clone(),
+        .map(|(i, fit)| {
+            if i == best {
+                return first.clone();
+            }
+            let fit = work.rescored(Fit { logs: first.logs, ..fit });
             // Far from the best the best one's sizes are far from right.
-            false if fit.score > limit - 3.0 * CLOSE => work.sized(fit, 1),
-            false => fit,
+            let far = fit.score < limit - 3.0 * CLOSE;
+            if far || is_beside(&fit, first.solution.likelihood) { fit } else { work.sized(fit, 1) }
         })
         .collect();
     let limit = best_score(&fits) - CLOSE;
-    fits.into_par_iter().map(|fit| if fit.score > limit { work.sized(fit, 1) } else { fit }).collect()
+    fits = fits
+        .into_par_iter()
+        .map(|fit| {
+            let settled = fit.score < limit || is_beside(&fit, first.solution.likelihood);
+            if settled { fit } else { work.sized(fit, 1) }
+        })
+        .collect();
+    fits
+}
+
+/// Whether a fit leaves so nearly what another leaves, by its likelihood with the same sizes, that the sizes are the same.
+fn is_beside(fit: &Fit, likelihood: f64) -> bool {
+    (fit.solution.likelihood - likelihood).abs() < BESIDE
 }
 
 /// Flaws of pairs by themselves, once more from the values that they have in the pair: from where no flaw is known the way
@@ -295,7 +312,8 @@ fn pairs(
     let most = looked.first().map_or_else(|| best_score(fits), |l| l.0.max(best_score(fits)));
     let close = looked.into_iter().filter(|l| l.0 > most - CLOSE_PAIR).map(|l| l.1).take(2 * most_pairs);
     // Sizes of the noise that a wrong flaw needs hide what is beside it: sizes are the pair's own.
-    let known = before.iter().map(|f| Start { set: f.flaws.clone(), from: f.values(), logs: f.logs });
+    let known =
+        before.iter().map(|f| Start { set: f.flaws.clone(), from: f.values(), logs: f.logs, beside: None });
     let mut chosen: Vec<Start> = Vec::new();
     for start in known.chain(close) {
         if !chosen.iter().any(|other| start.set.iter().all(|f| other.set.contains(f))) {
@@ -310,7 +328,8 @@ fn pairs(
             if !in_full {
                 return Some(fit);
             }
-            let fit = work.sized(fit, 2);
+            let beside = start.beside.is_some_and(|likelihood| is_beside(&fit, likelihood));
+            let fit = if beside { fit } else { work.sized(fit, 2) };
             Some(work.with_jumps(fit, MOST_JUMPS))
         })
         .collect()
@@ -321,6 +340,8 @@ struct Start {
     set: Vec<Flaw>,
     from: Theta,
     logs: Logs,
+    /// The likelihood of the flaw that a second is added to, with sizes of its own and without jumps.
+    beside: Option<f64>,
 }
 
 /// Each second flaw beside a fit, by columns of one pass: how likely the pair is at least.
@@ -347,7 +368,8 @@ fn second_flaws(work: &Work<'_, '_>, fit: &Fit, flaws: &[Flaw]) -> Vec<(f64, Sta
             let values: Vec<f64> = parameters.iter().map(|p| theta[*p]).collect();
             let solution = Normal::of(&whitened, &columns).solve(&values, &expected_of(&parameters));
             let set: Vec<Flaw> = fit.flaws.iter().copied().chain([flaw]).collect();
-            let start = Start { set, from: fit.values(), logs: fit.logs };
+            let beside = fit.jumps.is_empty().then_some(fit.solution.likelihood);
+            let start = Start { set, from: fit.values(), logs: fit.logs, beside };
             (fit.score - fit.solution.evidence + solution.evidence, start)
         })
         .collect()

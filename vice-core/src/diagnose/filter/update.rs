@@ -44,33 +44,34 @@ impl Update {
         for (row, out) in rows.iter().zip(self.rows.chunks_exact_mut(s)) {
             sum_of_rows(simd, row, &state.p, out, n);
         }
+        for a in 0..m {
+            // Sums that do not wait for each other.
+            let mut sums = [0.0; ROWS];
+            for (i, times) in rows[a].terms {
+                for b in 0..=a {
+                    sums[b] += times * self.rows[b * s + i];
+                }
+            }
+            sums[a] += rows[a].variance;
+            self.lower[a] = sums;
+        }
         let mut log_variances = 0.0;
         for a in 0..m {
-            for b in 0..=a {
-                let with = &self.rows[b * s..b * s + n];
-                let mut sum = if a == b { rows[a].variance } else { 0.0 };
-                for (i, times) in rows[a].terms {
-                    sum += times * with[i];
-                }
-                self.lower[a][b] = sum;
-            }
-        }
-        for a in 0..m {
-            for b in 0..a {
-                let mut sum = self.lower[a][b];
-                for k in 0..b {
-                    sum -= self.lower[a][k] * self.lower[b][k];
-                }
-                self.lower[a][b] = sum * self.inverse[b];
-            }
-            let mut sum = self.lower[a][a];
-            for k in 0..a {
-                sum -= self.lower[a][k] * self.lower[a][k];
-            }
             // No row has less variance than its own label, whatever rounding leaves.
-            let variance = sum.max(0.5 * rows[a].variance);
+            let variance = self.lower[a][a].max(0.5 * rows[a].variance);
             log_variances += variance.ln();
-            self.inverse[a] = 1.0 / variance.sqrt();
+            let inverse = 1.0 / variance.sqrt();
+            self.inverse[a] = inverse;
+            let mut column = [0.0; ROWS];
+            for b in a + 1..m {
+                column[b] = self.lower[b][a] * inverse;
+                self.lower[b][a] = column[b];
+            }
+            for b in a + 1..m {
+                for c in a + 1..=b {
+                    self.lower[b][c] -= column[b] * column[c];
+                }
+            }
         }
         for a in 0..m {
             let (before, rest) = self.rows.split_at_mut(a * s);
