@@ -19,6 +19,8 @@ const SIZE_STEP: f64 = 0.1;
 const DEAD: f64 = 1e8;
 /// Three frames may have a jump if their squares exceed their number by so many deviations.
 const EXCESS: f64 = 3.8;
+/// ... in so many frames.
+const USUAL_FRAMES: f64 = 300.0;
 /// Longest step of a size's logarithm.
 const LONGEST_SIZE_STEP: f64 = 0.8;
 
@@ -331,7 +333,9 @@ impl Work<'_, '_> {
             let rows = |f: usize| {
                 whitened.frame_rows[(f + 2).min(frames)] - whitened.frame_rows[f.saturating_sub(1)]
             };
-            if sum(worst) < EXCESS * (2.0 * rows(worst) as f64).sqrt() {
+            // The worst of many frames is worse by chance.
+            let limit = EXCESS + 0.5 * (frames as f64 / USUAL_FRAMES).max(1.0).ln();
+            if sum(worst) < limit * (2.0 * rows(worst) as f64).sqrt() {
                 break;
             }
             let tries: Vec<Jump> = [(0, 0), (0, 1), (2, 3), (0, 5), (5, 0), (5, 6), (1, 10), (10, 1)]

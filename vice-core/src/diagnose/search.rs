@@ -106,11 +106,7 @@ pub(super) fn search(
     let before: Vec<Fit> = fits.extract_if(.., |f| f.flaws.len() > 1).collect();
     fits = again(work, fits, 1);
     fits = sized(work, fits);
-    let close = best_score(&fits) - CLOSE_FOR_JUMPS;
-    fits = fits
-        .into_par_iter()
-        .map(|fit| if fit.score > close { work.with_jumps(fit, MOST_JUMPS) } else { fit })
-        .collect();
+    fits = jumping(work, fits);
     progress(4, steps);
     let pairs = pairs(work, &fits, flaws, &before, MOST_PAIRS, true);
     fits.extend(pairs);
@@ -251,6 +247,26 @@ fn sized(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
         })
         .collect();
     fits
+}
+
+/// With jumps, those that are close.
+fn jumping(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
+    let best = best_of(&fits);
+    let (likelihood, close) = (fits[best].solution.likelihood, fits[best].score - CLOSE_FOR_JUMPS);
+    let first = work.with_jumps(fits[best].clone(), MOST_JUMPS);
+    fits.into_par_iter()
+        .enumerate()
+        .map(|(i, fit)| match fit.score > close {
+            _ if i == best => first.clone(),
+            // The same frames are worst where the same is left.
+            true if is_beside(&fit, likelihood) => {
+                let (logs, jumps) = (first.logs, first.jumps.clone());
+                work.rescored(Fit { logs, jumps, jump_gain: first.jump_gain, ..fit })
+            }
+            true => work.with_jumps(fit, MOST_JUMPS),
+            false => fit,
+        })
+        .collect()
 }
 
 /// Whether a fit leaves so nearly what another leaves, by its likelihood with the same sizes, that the sizes are the same.
