@@ -24,8 +24,9 @@ const MOST_PAIRS: usize = 6;
 const NEARER: f64 = 1.5;
 /// A fit that leaves more than this share of what another leaves is in the same valley.
 const SAME_VALLEY: f64 = 0.95;
-/// A flaw that changes the likelihood by less than this changes no size of the noise.
+/// A flaw that changes the likelihood of so many labels by less than this changes no size of the noise.
 const BESIDE: f64 = 5.0;
+const USUAL_LABELS: f64 = 1200.0;
 /// Prior of no flaw, of one, of two.
 const NONE: f64 = 0.35;
 const ONE: f64 = 0.5;
@@ -271,7 +272,9 @@ fn jumping(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
 
 /// Whether a fit leaves so nearly what another leaves, by its likelihood with the same sizes, that the sizes are the same.
 fn is_beside(fit: &Fit, likelihood: f64) -> bool {
-    (fit.solution.likelihood - likelihood).abs() < BESIDE
+    // What own sizes would gain is the square of the difference over the number of labels.
+    let limit = BESIDE * (fit.residuals.len() as f64 / USUAL_LABELS).sqrt();
+    (fit.solution.likelihood - likelihood).abs() < limit
 }
 
 /// Flaws of pairs by themselves, once more from the values that they have in the pair: from where no flaw is known the way
