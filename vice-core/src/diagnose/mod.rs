@@ -185,6 +185,15 @@ impl<'a> Prepared<'a> {
             Some(_) => (as_read, Gross { conventions: vec![], frozen: false, likelier: 0.0 }),
             None => conventions(diagnosis, &scene, as_read, flaws)?,
         };
+        // A key point that has no depth wherever the camera is thought to be is nobody's flaw.
+        if scene.fixed_depth {
+            let points = scene.view(&Theta::zero(), &motion)?.points;
+            let keep: Vec<bool> = scene.labels.iter().map(|l| points[l.segment].is_some()).collect();
+            scene.only(&keep);
+        }
+        if scene.labels.is_empty() {
+            return Err(DiagnoseError::NothingScored);
+        }
         let plain = motion;
         let motion = match inertial {
             Some(_) => plain.clone(),
