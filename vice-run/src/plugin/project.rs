@@ -48,7 +48,7 @@ pub fn rust(name: &str, vice: &Dependency) -> Vec<File> {
         template!("rust", "src/dataset.rs"),
         template!("rust", "tests/check.rs"),
     ];
-    let (abi, core) = (vice.on("adapters/abi"), vice.on("vice-core"));
+    let (abi, core) = (vice.on("adapters/plugin/abi"), vice.on("vice-core"));
     fill(files, &[("name", name), ("Name", &camel(name)), ("vice_abi", &abi), ("vice_core", &core)])
 }
 

@@ -85,7 +85,7 @@ fn dependency(args: &Args) -> anyhow::Result<project::Dependency> {
             let no_checkout = || usage(format!("--vice-path: {} is no checkout of VICE", path.display()));
             // Absolute, so that the project can be moved.
             let path = path.canonicalize().map_err(|_| no_checkout())?;
-            if !path.join("adapters/abi/Cargo.toml").is_file() {
+            if !path.join("adapters/plugin/abi/Cargo.toml").is_file() {
                 return Err(no_checkout());
             }
             let text = path.to_str().ok_or_else(|| usage("--vice-path: the path is not UTF-8"))?;

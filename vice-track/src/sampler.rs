@@ -3,7 +3,7 @@
 
 use vice_core::camera::Pixel;
 
-use super::pyramid::Level;
+use crate::pyramid::Level;
 
 /// Weights of the pixels at -1, 0, 1 and 2 for a place `t` (0 to 1) beyond pixel 0.
 fn weights(t: f64) -> [f64; 4] {

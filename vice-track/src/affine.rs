@@ -7,8 +7,8 @@
 use nalgebra::{Matrix2, Matrix6, Vector2, Vector6};
 use vice_core::camera::Pixel;
 
-use super::pyramid::Level;
-use super::sampler::sample;
+use crate::pyramid::Level;
+use crate::sampler::sample;
 
 /// The template reaches this far from its centre, pixels of the frame it was cut from.
 pub(crate) const REACH_PX: i32 = 10;

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use nalgebra::Matrix2;
 use vice_core::camera::Pixel;
 
-use super::affine::{Match, NoMatch, Template, Warp};
-use super::lucas_kanade::track_one;
-use super::pyramid::Pyramid;
+use crate::affine::{Match, NoMatch, Template, Warp};
+use crate::lucas_kanade::track_one;
+use crate::pyramid::Pyramid;
 
 /// Under this confidence an observation is doubtful: a person should look at it.
 pub const DOUBT_CONFIDENCE: f64 = 0.5;
@@ -203,7 +203,7 @@ fn confidence(back_px: f64, jump_px: f64, correlation: f64) -> f64 {
 
 /// Whether the surroundings of a point are all in the image.
 fn has_room(frame: &Pyramid, px: Pixel) -> bool {
-    let margin = f64::from(super::affine::REACH_PX) + 2.0;
+    let margin = f64::from(crate::affine::REACH_PX) + 2.0;
     px.u >= margin
         && px.v >= margin
         && px.u <= frame.width() as f64 - 1.0 - margin

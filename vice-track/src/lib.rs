@@ -1,4 +1,6 @@
-//! The image tracker: where a scene point of one frame is in the next ones.
+//! The image tracker: where a scene point of one frame is in the next ones, and how sure that is.
+//!
+//! It takes pictures and gives pixels: no server, no files.
 //!
 //! | module | what |
 //! | --- | --- |
@@ -14,7 +16,8 @@
 //!
 //! The crate `patch-tracker` 0.4 was measured first, on the same 200 corners of eight real pairs of 752x480 and one thread:
 //! it lies 0.09 px from OpenCV in the median, but one corner in ten lies further off than 0.3 to 2.6 px, and it takes 6 to
-//! 9 ms where OpenCV takes 1.9 and this module 1.1 to 1.4. It has no template of an earlier frame and no confidence.
+//! 9 ms where OpenCV takes 1.9 and this crate 1.1 to 1.4. It has no template of an earlier frame and no confidence.
+#![forbid(unsafe_code)]
 
 mod affine;
 mod corners;

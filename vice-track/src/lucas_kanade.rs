@@ -5,8 +5,8 @@
 use fearless_simd::{Level as SimdLevel, Simd, dispatch};
 use vice_core::camera::Pixel;
 
-use super::pyramid::{Level, Pyramid, WINDOW_PX};
-use super::window::{Corner, Patch, Region};
+use crate::pyramid::{Level, Pyramid, WINDOW_PX};
+use crate::window::{Corner, Patch, Region};
 
 const MAX_STEPS: usize = 30;
 /// Squared length of a step that ends the search, pixels².

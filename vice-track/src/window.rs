@@ -5,7 +5,7 @@
 
 use fearless_simd::{Simd, SimdBase, f32x8};
 
-use super::pyramid::{Level, WINDOW_PX, mirrored};
+use crate::pyramid::{Level, WINDOW_PX, mirrored};
 
 /// Columns of a stored row of a window.
 pub(crate) const ROW: usize = 24;

@@ -3,7 +3,7 @@
 
 use vice_core::camera::Pixel;
 
-use super::pyramid::Pyramid;
+use crate::pyramid::Pyramid;
 
 /// Half a side of the window that is compared, pixels.
 const REACH: isize = 10;

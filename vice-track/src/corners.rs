@@ -3,7 +3,7 @@
 
 use vice_core::camera::Pixel;
 
-use super::pyramid::{Level, Pyramid};
+use crate::pyramid::{Level, Pyramid};
 
 /// Gradients are summed this far around a pixel.
 const REACH: usize = 3;
