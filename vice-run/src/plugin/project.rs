@@ -62,6 +62,7 @@ pub fn cpp(name: &str) -> Vec<File> {
     ];
     files.push(File { path: "vice_plugin.h", text: vice_abi::HEADER.to_string() });
     files.push(File { path: "vice_plugin.hpp", text: vice_abi::CPP_HEADER.to_string() });
+    files.push(File { path: "vice_plugin_export.hpp", text: vice_abi::CPP_EXPORT_HEADER.to_string() });
     fill(files, &[("name", name), ("Name", &camel(name))])
 }
 

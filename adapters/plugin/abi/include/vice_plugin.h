@@ -22,8 +22,8 @@
  * - The table, and all that it points at, lives as long as the library. Libraries are never unloaded.
  *
  * ERRORS
- * - A call returns VICE_OK, VICE_NONE where its comment allows it, or VICE_ERROR with a message: one line that says what is
- *   wrong, with the file and line, and what to do about it.
+ * - A call returns VICE_OK, VICE_NONE where its comment allows it, or an error with a message: one line that says what is
+ *   wrong, with the file and line, and what to do about it. The code says of which kind it is; where in doubt, VICE_ERROR.
  * - No exception and no longjmp may leave a call: that is undefined behaviour. vice_plugin.hpp sees to it.
  *
  * THREADS
@@ -42,14 +42,23 @@
 extern "C" {
 #endif
 
-/* Version of this contract. A plugin of another version is not loaded. */
-#define VICE_ABI_VERSION 0
+/*
+ * Version of this contract, and the oldest that a program of this version still loads. What came with version 2 is marked so;
+ * a plugin of version 0 is used as far as it goes. There was no version 1.
+ */
+#define VICE_ABI_VERSION 2
+#define VICE_ABI_OLDEST 0
 
 /* What calls return. */
 #define VICE_OK 0
 #define VICE_NONE 1      /* there is none: no depth image for this frame, no cloud, no state */
-#define VICE_ERROR 2     /* it failed, the message says why */
+#define VICE_ERROR 2     /* it failed, the message says why: bytes or numbers that cannot be what they should be */
 #define VICE_EXCEPTION 3 /* an exception or a panic was caught, the message says which: a bug of the plugin */
+/* Since version 2: as VICE_ERROR, of a kind that programs act on. */
+#define VICE_ERROR_MISSING 4       /* a file, stream, camera or topic that is asked for is not there */
+#define VICE_ERROR_UNSUPPORTED 5   /* well-formed data that the plugin does not read */
+#define VICE_ERROR_CONTRADICTORY 6 /* two statements of the data, or of the data and a setting, exclude each other */
+#define VICE_ERROR_USAGE 7         /* a setting that makes no sense, whatever the data */
 
 /* Flags of the table. */
 #define VICE_FLAG_THREAD_SAFE 1
@@ -71,7 +80,8 @@ extern "C" {
 
 /* Kinds of a pose stream. */
 #define VICE_STREAM_POSES 0    /* `trajectory` gives it */
-#define VICE_STREAM_RELATIVE 1 /* `relative_motions` gives it */
+#define VICE_STREAM_RELATIVE 1 /* `relative_motions` gives it; VICE chains the motions */
+#define VICE_STREAM_CHAINED 2  /* since version 2: `trajectory` gives it, chained by the plugin from motions: it starts anywhere */
 
 /* Formats of pixels. */
 #define VICE_PIXELS_GRAY8 0 /* one byte a pixel */
@@ -101,6 +111,10 @@ typedef struct vice_message {
     char *data;
     size_t capacity;
     size_t length;
+    /* Since version 2, optional: the bytes of the text that say what to do about it. They stand in brackets, which do not count:
+       `poses.csv:7: x is NaN (remove the row)`. */
+    size_t hint_start;
+    size_t hint_length;
 } vice_message;
 
 /* What the host gives. It lives as long as the process. */
@@ -190,6 +204,13 @@ typedef struct vice_image {
     size_t data_bytes; /* at least (height_px - 1) * row_stride_bytes + a row */
     void *owner;
 } vice_image;
+
+/* Since version 2. The stored file of an image, as it lies on the disk or in a message: PNG or JPEG. */
+typedef struct vice_image_file {
+    const uint8_t *data;
+    size_t data_bytes;
+    void *owner;
+} vice_image_file;
 
 /* A depth image registered to a frame of a camera, rows from the top. */
 typedef struct vice_depth_image {
@@ -288,6 +309,22 @@ typedef struct vice_facts {
     void *owner;
 } vice_facts;
 
+/* Since version 2. Something in the data that may make the numbers wrong, but does not stop the work. */
+typedef struct vice_suspicion {
+    vice_text code;     /* a stable name such as `rows-left-out`, for programs: a-z, 0-9 and - */
+    vice_text about;    /* a file, a stream, a topic or a camera; empty: the whole data set */
+    vice_text message;  /* what looks wrong, in a sentence */
+    vice_text evidence; /* the numbers that make it look so, or empty */
+    vice_text advice;   /* what to do about it, or empty */
+    uint64_t count;     /* how often the same was seen, at least 1 */
+} vice_suspicion;
+
+typedef struct vice_suspicions {
+    const vice_suspicion *suspicions;
+    size_t count;
+    void *owner;
+} vice_suspicions;
+
 /* What a plugin hands over. */
 typedef struct vice_plugin_table {
     uint32_t abi_version; /* VICE_ABI_VERSION */
@@ -314,11 +351,12 @@ typedef struct vice_plugin_table {
     int32_t (*describe)(void *dataset, vice_dataset_info *info, vice_message *message);
     int32_t (*camera)(void *dataset, size_t camera_index, vice_camera *camera, vice_message *message);
     int32_t (*frames)(void *dataset, size_t camera_index, vice_stamps *frames, vice_message *message);
+    /* Since version 2 VICE_NONE where `image_file` gives a file: VICE decodes it. */
     int32_t (*image)(void *dataset, size_t camera_index, size_t frame_index, vice_image *image,
                      vice_message *message);
     int32_t (*body_from_camera)(void *dataset, size_t camera_index, int64_t stamp_ns,
                                 vice_rigid *body_from_camera, vice_message *message);
-    /* A stream of VICE_STREAM_POSES. */
+    /* A stream of VICE_STREAM_POSES or VICE_STREAM_CHAINED. */
     int32_t (*trajectory)(void *dataset, size_t stream_index, vice_poses *poses, vice_message *message);
 
     /* Optional: a stream of VICE_STREAM_RELATIVE. */
@@ -338,6 +376,12 @@ typedef struct vice_plugin_table {
     int32_t (*floor)(void *dataset, int64_t keyframe_ns, vice_floor *floor, vice_message *message);
     /* Optional. */
     int32_t (*facts)(void *dataset, vice_facts *facts, vice_message *message);
+
+    /* Since version 2, optional. VICE_NONE: this image is no PNG or JPEG of its own. A browser shows the file in place of `image`. */
+    int32_t (*image_file)(void *dataset, size_t camera_index, size_t frame_index, vice_image_file *file,
+                          vice_message *message);
+    /* Since version 2, optional: what looked wrong when the data set was opened and read so far, each once. Asked after reading. */
+    int32_t (*suspicions)(void *dataset, vice_suspicions *suspicions, vice_message *message);
 } vice_plugin_table;
 
 #if defined(_WIN32)

@@ -2,32 +2,42 @@
 //
 // Every call catches what is thrown and hands its text over as the error; nothing else may cross the border. Throw
 // vice::Error (or anything derived from std::exception) with one line: what is wrong, with the file and line, and what to do.
-// vice_plugin.h says which frames, units and orders are meant.
+// vice_plugin.h says which frames, units and orders are meant; vice_plugin_export.hpp fills its table from these classes.
 #ifndef VICE_PLUGIN_HPP
 #define VICE_PLUGIN_HPP
 
-#include <cstring>
+#include <cstddef>
+#include <cstdint>
 #include <map>
 #include <memory>
-#include <new>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "vice_plugin.h"
 
 namespace vice {
 
-// Data that cannot be used.
+// Data that cannot be used: what is wrong, what to do about it, and of which kind it is (VICE_ERROR_...).
 class Error : public std::runtime_error {
   public:
-    using std::runtime_error::runtime_error;
+    explicit Error(const std::string &problem, const std::string &hint = {}, std::int32_t code = VICE_ERROR)
+        : std::runtime_error(hint.empty() ? problem : problem + " (" + hint + ")"),
+          hint_length_(hint.size()),
+          code_(code < VICE_ERROR ? VICE_ERROR : code) {}
+
+    // The last bytes of what(), before the bracket.
+    std::size_t hint_length() const { return hint_length_; }
+    std::int32_t code() const { return code_; }
+
+  private:
+    std::size_t hint_length_;
+    std::int32_t code_;
 };
 
-// A decoded image: rows tight, from the top.
+// A decoded image: rows tight, from the top. Without pixels VICE decodes what image_file gives.
 struct Image {
     std::uint32_t width_px = 0;
     std::uint32_t height_px = 0;
@@ -57,12 +67,22 @@ struct CameraName {
 
 struct StreamName {
     std::string name;  // "ground-truth" for the truth
-    bool relative = false;
+    std::int32_t kind = VICE_STREAM_POSES;
 };
 
 struct Fact {
     std::string section;
     std::string text;
+};
+
+// Something in the data that may make the numbers wrong, but does not stop the work.
+struct Suspicion {
+    std::string code;     // a stable name such as "rows-left-out": a-z, 0-9 and -
+    std::string about;    // a file, a stream, a topic or a camera; empty: the whole data set
+    std::string message;  // what looks wrong, in a sentence
+    std::string evidence;
+    std::string advice;
+    std::uint64_t count = 1;  // how often the same was seen
 };
 
 struct SettingInfo {
@@ -94,12 +114,15 @@ class Dataset {
     virtual vice_camera camera(std::size_t camera_index) = 0;
     // Strictly increasing.
     virtual std::vector<std::int64_t> frames_ns(std::size_t camera_index) = 0;
-    virtual Image image(std::size_t camera_index, std::size_t frame_index) = 0;
+    // One of the next two. The file is a PNG or JPEG as it is stored: VICE decodes it where there is no image, and a browser
+    // shows it as it is.
+    virtual Image image(std::size_t, std::size_t) { return {}; }
+    virtual std::optional<std::vector<std::uint8_t>> image_file(std::size_t, std::size_t) { return std::nullopt; }
     virtual vice_rigid body_from_camera(std::size_t camera_index, std::int64_t stamp_ns) = 0;
-    // Strictly increasing stamps, world_from_body.
+    // Strictly increasing stamps, world_from_body. Of a stream of VICE_STREAM_POSES or VICE_STREAM_CHAINED.
     virtual std::vector<vice_pose> trajectory(std::size_t stream_index) = 0;
 
-    // Of a stream that is relative.
+    // Of a stream of VICE_STREAM_RELATIVE.
     virtual std::vector<vice_motion> relative_motions(std::size_t) {
         throw Error("this plugin has no relative motions");
     }
@@ -110,6 +133,8 @@ class Dataset {
     // Without one z = 0 of the world.
     virtual std::optional<vice_floor> floor(std::int64_t) { return std::nullopt; }
     virtual std::vector<Fact> facts() { return {}; }
+    // What looked wrong so far, each once. Asked after the data was read.
+    virtual std::vector<Suspicion> suspicions() { return {}; }
 };
 
 // A format. One object is made, once, and never destroyed.
@@ -131,374 +156,9 @@ class Format {
 inline void log(std::int32_t level, std::string_view line);
 inline void warn(std::string_view line) { log(VICE_LOG_WARN, line); }
 
-// Hidden, or the loader would take the static variables of two plugins for one.
-#if defined(__GNUC__)
-#pragma GCC visibility push(hidden)
-#endif
-namespace detail {
-
-inline const vice_host *&host() {
-    static const vice_host *the_host = nullptr;
-    return the_host;
-}
-
-inline vice_text text(std::string_view view) { return {view.data(), view.size()}; }
-
-inline std::string string(vice_text t) { return t.length == 0 ? std::string() : std::string(t.data, t.length); }
-
-inline void say(vice_message *message, std::string_view what) {
-    if (message == nullptr) return;
-    message->length = what.size();
-    const std::size_t n = what.size() < message->capacity ? what.size() : message->capacity;
-    if (n > 0 && message->data != nullptr) std::memcpy(message->data, what.data(), n);
-}
-
-// Calls f; what it throws becomes the error.
-template <class F>
-std::int32_t guard(vice_message *message, F &&f) noexcept {
-    try {
-        return f();
-    } catch (const Error &e) {
-        say(message, e.what());
-        return VICE_ERROR;
-    } catch (const std::bad_alloc &) {
-        say(message, "out of memory");
-        return VICE_ERROR;
-    } catch (const std::exception &e) {
-        say(message, e.what());
-        return VICE_EXCEPTION;
-    } catch (...) {
-        say(message, "something that is no std::exception was thrown");
-        return VICE_EXCEPTION;
-    }
-}
-
-// Memory that goes to the host until it is released.
-struct Owner {
-    virtual ~Owner() = default;
-};
-
-template <class T>
-struct Holder final : Owner {
-    explicit Holder(T v) : value(std::move(v)) {}
-    T value;
-};
-
-template <class T>
-Holder<T> *hold(T value) {
-    return new Holder<T>(std::move(value));
-}
-
-// As void* so that release can go back the same way.
-inline void *token(Owner *owner) { return owner; }
-
-// A list, with what it lies in until it is released.
-template <class List, class T>
-void give(List *out, std::vector<T> values) {
-    auto *held = hold(std::move(values));
-    *out = {held->value.data(), held->value.size(), token(held)};
-}
-
-struct OpenDataset {
-    std::unique_ptr<Dataset> dataset;
-    std::string name;
-    std::vector<CameraName> cameras;
-    std::vector<StreamName> streams;
-    std::vector<vice_camera_entry> camera_entries;
-    std::vector<vice_stream_entry> stream_entries;
-
-    void check_camera(std::size_t index) const {
-        if (index >= cameras.size()) throw Error("there is no camera " + std::to_string(index));
-    }
-    void check_stream(std::size_t index) const {
-        if (index >= streams.size()) throw Error("there is no pose stream " + std::to_string(index));
-    }
-};
-
-inline OpenDataset &of(void *dataset) {
-    if (dataset == nullptr) throw Error("the data set is null");
-    return *static_cast<OpenDataset *>(dataset);
-}
-
-template <class FormatClass>
-struct Export {
-    static FormatClass &format() {
-        static FormatClass *the_format = new FormatClass();
-        return *the_format;
-    }
-
-    static std::int32_t probe(vice_text path, vice_probe *out, vice_message *message) noexcept {
-        return guard(message, [&] {
-            Probe answer = format().probe(string(path));
-            out->answer = answer.answer;
-            if (!answer.paths.empty()) {
-                auto paths = std::make_unique<Holder<std::pair<Probe, std::vector<vice_text>>>>(
-                    std::pair<Probe, std::vector<vice_text>>(std::move(answer), {}));
-                for (const std::string &p : paths->value.first.paths) paths->value.second.push_back(text(p));
-                out->paths = paths->value.second.data();
-                out->count = paths->value.second.size();
-                out->owner = token(paths.release());
-            }
-            return VICE_OK;
-        });
-    }
-
-    static std::int32_t open(vice_text path, const vice_setting *settings, std::size_t count, void **out,
-                             vice_message *message) noexcept {
-        return guard(message, [&] {
-            Settings given;
-            for (std::size_t i = 0; i < count; ++i) given[string(settings[i].key)] = string(settings[i].value);
-            auto opened = std::make_unique<OpenDataset>();
-            opened->dataset = format().open(string(path), given);
-            if (!opened->dataset) throw Error(string(path) + ": cannot be opened");
-            opened->name = opened->dataset->name();
-            opened->cameras = opened->dataset->cameras();
-            opened->streams = opened->dataset->streams();
-            for (const CameraName &c : opened->cameras)
-                opened->camera_entries.push_back(
-                    {text(c.name), c.has_depth ? std::uint64_t{VICE_CAMERA_HAS_DEPTH} : std::uint64_t{0}});
-            for (const StreamName &s : opened->streams)
-                opened->stream_entries.push_back(
-                    {text(s.name), s.relative ? VICE_STREAM_RELATIVE : VICE_STREAM_POSES, 0});
-            *out = opened.release();
-            return VICE_OK;
-        });
-    }
-
-    static void close(void *dataset) noexcept {
-        guard(nullptr, [&] {
-            delete static_cast<OpenDataset *>(dataset);
-            return VICE_OK;
-        });
-    }
-
-    static void release(void *owner) noexcept {
-        guard(nullptr, [&] {
-            delete static_cast<Owner *>(owner);
-            return VICE_OK;
-        });
-    }
-
-    static std::int32_t describe(void *dataset, vice_dataset_info *out, vice_message *message) noexcept {
-        return guard(message, [&] {
-            OpenDataset &d = of(dataset);
-            out->name = text(d.name);
-            out->cameras = d.camera_entries.data();
-            out->camera_count = d.camera_entries.size();
-            out->streams = d.stream_entries.data();
-            out->stream_count = d.stream_entries.size();
-            return VICE_OK;
-        });
-    }
-
-    static std::int32_t camera(void *dataset, std::size_t index, vice_camera *out, vice_message *message) noexcept {
-        return guard(message, [&] {
-            OpenDataset &d = of(dataset);
-            d.check_camera(index);
-            *out = d.dataset->camera(index);
-            return VICE_OK;
-        });
-    }
-
-    static std::int32_t frames(void *dataset, std::size_t index, vice_stamps *out, vice_message *message) noexcept {
-        return guard(message, [&] {
-            OpenDataset &d = of(dataset);
-            d.check_camera(index);
-            give(out, d.dataset->frames_ns(index));
-            return VICE_OK;
-        });
-    }
-
-    static std::int32_t image(void *dataset, std::size_t camera, std::size_t frame, vice_image *out,
-                              vice_message *message) noexcept {
-        return guard(message, [&] {
-            OpenDataset &d = of(dataset);
-            d.check_camera(camera);
-            auto *held = hold(d.dataset->image(camera, frame));
-            const Image &i = held->value;
-            const std::uint32_t pixel_bytes = i.format == VICE_PIXELS_RGB8 ? 3 : 1;
-            *out = {i.width_px,      i.height_px,     i.format,   i.width_px * pixel_bytes,
-                    i.pixels.data(), i.pixels.size(), token(held)};
-            return VICE_OK;
-        });
-    }
-
-    static std::int32_t body_from_camera(void *dataset, std::size_t camera, std::int64_t stamp_ns, vice_rigid *out,
-                                         vice_message *message) noexcept {
-        return guard(message, [&] {
-            OpenDataset &d = of(dataset);
-            d.check_camera(camera);
-            *out = d.dataset->body_from_camera(camera, stamp_ns);
-            return VICE_OK;
-        });
-    }
-
-    static std::int32_t trajectory(void *dataset, std::size_t index, vice_poses *out, vice_message *message) noexcept {
-        return guard(message, [&] {
-            OpenDataset &d = of(dataset);
-            d.check_stream(index);
-            give(out, d.dataset->trajectory(index));
-            return VICE_OK;
-        });
-    }
-
-    static std::int32_t relative_motions(void *dataset, std::size_t index, vice_motions *out,
-                                         vice_message *message) noexcept {
-        return guard(message, [&] {
-            OpenDataset &d = of(dataset);
-            d.check_stream(index);
-            give(out, d.dataset->relative_motions(index));
-            return VICE_OK;
-        });
-    }
-
-    static std::int32_t imu(void *dataset, vice_imu_samples *out, vice_message *message) noexcept {
-        return guard(message, [&] {
-            give(out, of(dataset).dataset->imu());
-            return VICE_OK;
-        });
-    }
-
-    static std::int32_t inertial_state(void *dataset, std::int64_t stamp_ns, vice_inertial_state *out,
-                                       vice_message *message) noexcept {
-        return guard(message, [&] {
-            const auto state = of(dataset).dataset->inertial_state(stamp_ns);
-            if (!state) return VICE_NONE;
-            *out = *state;
-            return VICE_OK;
-        });
-    }
-
-    static std::int32_t depth_image(void *dataset, std::size_t camera, std::size_t frame, vice_depth_image *out,
-                                    vice_message *message) noexcept {
-        return guard(message, [&] {
-            OpenDataset &d = of(dataset);
-            d.check_camera(camera);
-            auto depth = d.dataset->depth_image(camera, frame);
-            if (!depth) return VICE_NONE;
-            auto *held = hold(std::move(*depth));
-            const DepthImage &i = held->value;
-            *out = {i.stamp_ns,      i.width_px, i.height_px, i.z_m.data(), i.z_m.size() * sizeof(float),
-                    i.width_px * 4u, 0,          token(held)};
-            return VICE_OK;
-        });
-    }
-
-    static std::int32_t cloud(void *dataset, vice_cloud *out, vice_message *message) noexcept {
-        return guard(message, [&] {
-            auto cloud = of(dataset).dataset->cloud();
-            if (!cloud) return VICE_NONE;
-            auto *held = hold(std::move(*cloud));
-            const Cloud &c = held->value;
-            out->kind = c.ply_path.empty() ? VICE_CLOUD_POINTS : VICE_CLOUD_PLY;
-            out->ply_path = text(c.ply_path);
-            out->points = c.points.data();
-            out->count = c.points.size();
-            out->world_from_cloud = c.world_from_cloud;
-            out->owner = token(held);
-            return VICE_OK;
-        });
-    }
-
-    static std::int32_t floor(void *dataset, std::int64_t keyframe_ns, vice_floor *out, vice_message *message) noexcept {
-        return guard(message, [&] {
-            const auto floor = of(dataset).dataset->floor(keyframe_ns);
-            if (!floor) return VICE_NONE;
-            *out = *floor;
-            return VICE_OK;
-        });
-    }
-
-    static std::int32_t facts(void *dataset, vice_facts *out, vice_message *message) noexcept {
-        return guard(message, [&] {
-            using Held = std::pair<std::vector<Fact>, std::vector<vice_fact>>;
-            auto held = std::make_unique<Holder<Held>>(Held(of(dataset).dataset->facts(), {}));
-            for (const Fact &f : held->value.first) held->value.second.push_back({text(f.section), text(f.text)});
-            out->facts = held->value.second.data();
-            out->count = held->value.second.size();
-            out->owner = token(held.release());
-            return VICE_OK;
-        });
-    }
-
-    // What the table points at.
-    struct Texts {
-        std::string name, version, description;
-        std::vector<std::string> offers;
-        std::vector<SettingInfo> settings;
-        std::vector<vice_text> offer_texts;
-        std::vector<vice_setting_info> setting_infos;
-        vice_plugin_table table{};
-    };
-
-    static vice_plugin_table *make() {
-        auto texts = std::make_unique<Texts>();
-        FormatClass &f = format();
-        texts->name = f.name();
-        texts->version = f.version();
-        texts->description = f.description();
-        texts->offers = f.offers();
-        texts->settings = f.settings();
-        for (const std::string &o : texts->offers) texts->offer_texts.push_back(text(o));
-        for (const SettingInfo &s : texts->settings)
-            texts->setting_infos.push_back({text(s.key), text(s.description)});
-        vice_plugin_table &t = texts->table;
-        t.abi_version = VICE_ABI_VERSION;
-        t.struct_size = sizeof(vice_plugin_table);
-        t.flags = f.thread_safe() ? VICE_FLAG_THREAD_SAFE : 0;
-        t.name = text(texts->name);
-        t.version = text(texts->version);
-        t.description = text(texts->description);
-        t.offers = texts->offer_texts.data();
-        t.offer_count = texts->offer_texts.size();
-        t.settings = texts->setting_infos.data();
-        t.setting_count = texts->setting_infos.size();
-        t.probe = &probe;
-        t.open = &open;
-        t.close = &close;
-        t.release = &release;
-        t.describe = &describe;
-        t.camera = &camera;
-        t.frames = &frames;
-        t.image = &image;
-        t.body_from_camera = &body_from_camera;
-        t.trajectory = &trajectory;
-        t.relative_motions = &relative_motions;
-        t.imu = &imu;
-        t.inertial_state = &inertial_state;
-        t.depth_image = &depth_image;
-        t.cloud = &cloud;
-        t.floor = &floor;
-        t.facts = &facts;
-        // Lives as long as the library, which is never unloaded.
-        return &texts.release()->table;
-    }
-
-    static const vice_plugin_table *table(const vice_host *given) noexcept {
-        host() = given;
-        try {
-            static const vice_plugin_table *the_table = make();
-            return the_table;
-        } catch (const std::exception &e) {
-            log(VICE_LOG_ERROR, e.what());
-        } catch (...) {
-            log(VICE_LOG_ERROR, "something that is no std::exception was thrown");
-        }
-        return nullptr;
-    }
-};
-
-}  // namespace detail
-#if defined(__GNUC__)
-#pragma GCC visibility pop
-#endif
-
-inline void log(std::int32_t level, std::string_view line) {
-    const vice_host *h = detail::host();
-    if (h != nullptr && h->log != nullptr) h->log(h->context, level, detail::text(line));
-}
-
 }  // namespace vice
+
+#include "vice_plugin_export.hpp"
 
 // Exports a format: a class that is default constructible and derived from vice::Format.
 #define VICE_PLUGIN(FormatClass)                                                             \

@@ -35,3 +35,5 @@ pub use text::path_from_bytes;
 pub const HEADER: &str = include_str!("../include/vice_plugin.h");
 /// Its wrapper for C++17, `include/vice_plugin.hpp`.
 pub const CPP_HEADER: &str = include_str!("../include/vice_plugin.hpp");
+/// What the wrapper is made of, `include/vice_plugin_export.hpp`.
+pub const CPP_EXPORT_HEADER: &str = include_str!("../include/vice_plugin_export.hpp");

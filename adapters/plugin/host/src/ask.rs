@@ -4,7 +4,7 @@
 use std::ffi::c_void;
 
 use vice_abi::contract::{self, Message};
-use vice_core::error::{DataError, DataResult};
+use vice_core::error::{DataError, DataResult, ErrorKind};
 
 use crate::border::{Fault, MessageBuffer};
 use crate::library::Library;
@@ -27,7 +27,20 @@ macro_rules! answers {
         }
     )*};
 }
-answers!(Probe, DatasetInfo, Stamps, Image, DepthImage, Poses, Motions, ImuSamples, Cloud, Facts);
+answers!(
+    Probe,
+    DatasetInfo,
+    Stamps,
+    Image,
+    ImageFile,
+    DepthImage,
+    Poses,
+    Motions,
+    ImuSamples,
+    Cloud,
+    Facts,
+    Suspicions
+);
 
 macro_rules! plain_answers {
     ($($name:ty),*) => {$(
@@ -64,14 +77,27 @@ pub(crate) fn ask<T: Answer, R>(
             taken.map(Some).map_err(bug)
         }
         contract::NONE => Ok(None),
-        contract::ERROR => Err(match buffer.text(&message) {
-            // In the plugin's own words, as a built-in format would say it.
-            Some(text) => DataError::new(text),
-            None => bug("it failed and does not say why".to_string()),
-        }),
         contract::EXCEPTION => Err(bug(buffer.text(&message).unwrap_or_else(|| "an exception".to_string()))),
-        code => Err(bug(format!("the call returned {code}, which is none of the contract's codes"))),
+        code => Err(match kind(code) {
+            // In the plugin's own words, as a built-in format would say it.
+            Some(kind) => buffer
+                .error(&message, kind)
+                .unwrap_or_else(|| bug("it failed and does not say why".to_string())),
+            None => bug(format!("the call returned {code}, which is none of the contract's codes")),
+        }),
     }
+}
+
+/// The kind of an error by its code; `None` for a code that is none of an error.
+pub(crate) const fn kind(code: i32) -> Option<ErrorKind> {
+    Some(match code {
+        contract::ERROR => ErrorKind::Corrupt,
+        contract::ERROR_MISSING => ErrorKind::Missing,
+        contract::ERROR_UNSUPPORTED => ErrorKind::Unsupported,
+        contract::ERROR_CONTRADICTORY => ErrorKind::Contradictory,
+        contract::ERROR_USAGE => ErrorKind::Usage,
+        _ => return None,
+    })
 }
 
 /// As [`ask`], where there must be an answer.

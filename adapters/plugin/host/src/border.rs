@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use vice_abi::contract::{Message, Text};
 use vice_abi::path_from_bytes;
+use vice_core::error::{DataError, ErrorKind};
 
 /// What a plugin's author got wrong.
 pub(crate) type Fault = String;
@@ -100,7 +101,25 @@ impl MessageBuffer {
     }
 
     pub(crate) const fn message(&mut self) -> Message {
-        Message { data: self.bytes.as_mut_ptr(), capacity: Self::CAPACITY, length: 0 }
+        Message {
+            data: self.bytes.as_mut_ptr(),
+            capacity: Self::CAPACITY,
+            length: 0,
+            hint_start: 0,
+            hint_length: 0,
+        }
+    }
+
+    /// What was written as an error, its hint told apart; `None` where nothing was.
+    pub(crate) fn error(&self, written: &Message, kind: ErrorKind) -> Option<DataError> {
+        let text = self.text(written)?;
+        Some(match with_hint(&text, written) {
+            Some((problem, hint, "")) => DataError::of_kind(kind, problem).hint(hint),
+            Some((problem, hint, cause)) => {
+                DataError::of_kind(kind, problem).hint(hint).because(DataError::new(cause))
+            }
+            None => DataError::of_kind(kind, text),
+        })
     }
 
     /// What was written, `None` where nothing was. Cut or broken text is shown as far as it goes.
@@ -120,6 +139,18 @@ impl MessageBuffer {
         }
         (!text.trim().is_empty()).then_some(text)
     }
+}
+
+/// A text in three parts, `problem (hint): cause`; `None` where the hint is not where it is said to be.
+fn with_hint<'a>(text: &'a str, written: &Message) -> Option<(&'a str, &'a str, &'a str)> {
+    let (start, length) = (written.hint_start, written.hint_length);
+    let end = start.checked_add(length).filter(|_| length > 0)?;
+    let (problem, hint, rest) = (text.get(..start)?, text.get(start..end)?, text.get(end..)?);
+    let cause = match rest.strip_prefix(')')? {
+        "" => "",
+        rest => rest.strip_prefix(": ")?,
+    };
+    Some((problem.strip_suffix(" (")?, hint, cause))
 }
 
 #[cfg(test)]
@@ -169,5 +200,23 @@ mod tests {
         let long = "é".repeat(2000);
         assert!(said(long.as_bytes(), long.len()).unwrap().ends_with("é…"));
         assert!(said(b"x", usize::MAX).unwrap().ends_with('…'));
+    }
+
+    #[test]
+    fn hints_are_told_apart_where_they_are_what_they_should_be() {
+        let said = |text: &str, hint_start: usize, hint_length: usize| {
+            let mut buffer = MessageBuffer::new();
+            buffer.bytes[..text.len()].copy_from_slice(text.as_bytes());
+            let message = Message { length: text.len(), hint_start, hint_length, ..buffer.message() };
+            let error = buffer.error(&message, ErrorKind::Usage).unwrap();
+            assert_eq!(vice_core::error::one_line(&error), text);
+            assert_eq!(error.kind(), ErrorKind::Usage);
+            error.hint_text().map(str::to_string)
+        };
+        assert_eq!(said("a: é (do b)", 7, 4).as_deref(), Some("do b"));
+        assert_eq!(said("a: é (do b): why", 7, 4).as_deref(), Some("do b"));
+        for (start, length) in [(0, 0), (3, 2), (4, 2), (7, 5), (7, 400), (usize::MAX, 2), (2, usize::MAX)] {
+            assert_eq!(said("a: é (do b)", start, length), None, "{start} {length}");
+        }
     }
 }

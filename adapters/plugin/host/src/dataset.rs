@@ -1,50 +1,28 @@
 //! A data set of a plugin behind the core's trait.
 #![allow(unsafe_code)]
 
-use std::ffi::c_void;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
-use vice_abi::contract::{self, Text};
+use vice_abi::contract;
 use vice_core::camera::Camera;
 use vice_core::dataset::{
-    CloudRef, CloudSource, Dataset, DepthImage, Fact, Floor, Image, OpenOptions, Plane, Probe,
+    CloudRef, CloudSource, Dataset, DepthImage, Fact, Floor, Image, OpenOptions, Plane,
 };
-use vice_core::error::{DataError, DataResult};
+use vice_core::error::{DataError, DataResult, one_line};
 use vice_core::frames::BodyFromCamera;
 use vice_core::imu::{ImuSample, InertialState};
+use vice_core::suspicion::Suspicion;
 use vice_core::time::Stamp;
 use vice_core::trajectory::Trajectory;
+use vice_files::image_file;
 
 use crate::ask::{MISTAKE, ask, must};
-use crate::border::{self, Fault};
+use crate::border;
+use crate::description::{CameraEntry, Description, StreamEntry, StreamKind, describe};
+use crate::handle::Handle;
 use crate::library::Library;
 use crate::values;
-
-/// Asks a plugin about a path.
-pub(crate) fn probe(library: &Library, path: &Path) -> DataResult<Probe> {
-    must(
-        library,
-        &|| "probe".to_string(),
-        // SAFETY: the path lives during the call, the rest is as the contract says.
-        |out, message| unsafe { (library.calls.probe)(Text::from_path(path), out, message) },
-        |probe: &contract::Probe| match probe.answer {
-            contract::PROBE_NO => Ok(Probe::No),
-            contract::PROBE_YES => Ok(Probe::Yes),
-            contract::PROBE_COLLECTION => {
-                // SAFETY: the plugin's promise.
-                let paths = unsafe { border::list(probe.paths, probe.count, "paths") }?;
-                if paths.is_empty() {
-                    return Err("a collection of no data sets".to_string());
-                }
-                // SAFETY: the plugin's promise.
-                let path = |p: &Text| unsafe { border::path(*p, "a path of the collection") };
-                Ok(Probe::Collection(paths.iter().map(path).collect::<Result<_, _>>()?))
-            }
-            other => Err(format!("the answer {other} is none of the contract's")),
-        },
-    )
-}
 
 /// An open data set of a plugin, closed when it is dropped.
 pub(crate) struct PluginDataset {
@@ -56,88 +34,10 @@ pub(crate) struct PluginDataset {
     imu: OnceLock<Arc<[ImuSample]>>,
 }
 
-struct CameraEntry {
-    name: String,
-    has_depth: bool,
-    frames: OnceLock<Arc<[Stamp]>>,
-}
-
-struct StreamEntry {
-    name: String,
-    relative: bool,
-}
-
-/// What the plugin calls a data set.
-pub(crate) struct Handle {
-    library: Arc<Library>,
-    dataset: *mut c_void,
-}
-
-// SAFETY: the contract lets calls on a data set come from any thread, and they overlap only where the plugin allows it.
-unsafe impl Send for Handle {}
-// SAFETY: as above.
-unsafe impl Sync for Handle {}
-
-impl Drop for Handle {
-    fn drop(&mut self) {
-        let _turn = self.library.turn();
-        // SAFETY: open, and closed once; nobody else has it any more.
-        unsafe { (self.library.calls.close)(self.dataset) };
-    }
-}
-
-impl Handle {
-    pub(crate) fn open(library: &Arc<Library>, path: &Path, options: &OpenOptions) -> DataResult<Self> {
-        let settings: Vec<contract::Setting> = options
-            .settings
-            .iter()
-            .map(|(key, value)| contract::Setting {
-                key: Text::from_bytes(key.as_bytes()),
-                value: Text::from_bytes(value.as_bytes()),
-            })
-            .collect();
-        must(
-            library,
-            &|| format!("opening {}", path.display()),
-            // SAFETY: path and settings live during the call, the rest is as the contract says.
-            |out, message| unsafe {
-                let path = Text::from_path(path);
-                (library.calls.open)(path, settings.as_ptr(), settings.len(), out, message)
-            },
-            |dataset: &*mut c_void| match dataset.is_null() {
-                true => Err("the data set is null".to_string()),
-                false => Ok(Self { library: Arc::clone(library), dataset: *dataset }),
-            },
-        )
-    }
-
-    pub(crate) const fn raw(&self) -> *mut c_void {
-        self.dataset
-    }
-}
-
 impl PluginDataset {
     pub(crate) fn open(library: &Arc<Library>, path: &Path, options: &OpenOptions) -> DataResult<Self> {
         let handle = Handle::open(library, path, options)?;
-        let (name, cameras, streams) = must(
-            library,
-            &|| "describe".to_string(),
-            // SAFETY: an open data set.
-            |out, message| unsafe { (library.calls.describe)(handle.raw(), out, message) },
-            |info: &contract::DatasetInfo| {
-                // SAFETY: the plugin's promise.
-                let name = unsafe { border::name(info.name, "the data set's name") }?;
-                // SAFETY: the plugin's promise.
-                let cameras = unsafe { border::list(info.cameras, info.camera_count, "cameras") }?;
-                // SAFETY: the plugin's promise.
-                let streams = unsafe { border::list(info.streams, info.stream_count, "streams") }?;
-                let cameras = cameras.iter().map(camera_entry).collect::<Result<Vec<_>, _>>()?;
-                let streams = streams.iter().map(stream_entry).collect::<Result<Vec<_>, _>>()?;
-                unique(cameras.iter().map(|c| c.name.as_str()), "cameras")?;
-                unique(streams.iter().map(|s| s.name.as_str()), "pose streams")?;
-                Ok((name, cameras, streams))
-            },
-        )?;
+        let Description { name, cameras, streams } = describe(&handle)?;
         Ok(Self { library: Arc::clone(library), handle, name, cameras, streams, imu: OnceLock::new() })
     }
 
@@ -158,35 +58,6 @@ impl PluginDataset {
             |s: &contract::Stamps| values::frames(unsafe { border::list(s.stamps_ns, s.count, "stamps") }?),
         )?;
         Ok(stamps.into())
-    }
-}
-
-fn camera_entry(entry: &contract::CameraEntry) -> Result<CameraEntry, Fault> {
-    // SAFETY: the plugin's promise.
-    let name = unsafe { border::name(entry.name, "the name of a camera") }?;
-    Ok(CameraEntry {
-        name,
-        has_depth: entry.flags & contract::CAMERA_HAS_DEPTH != 0,
-        frames: OnceLock::new(),
-    })
-}
-
-fn stream_entry(entry: &contract::StreamEntry) -> Result<StreamEntry, Fault> {
-    // SAFETY: the plugin's promise.
-    let name = unsafe { border::name(entry.name, "the name of a pose stream") }?;
-    match entry.kind {
-        contract::STREAM_POSES => Ok(StreamEntry { name, relative: false }),
-        contract::STREAM_RELATIVE => Ok(StreamEntry { name, relative: true }),
-        other => Err(format!("kind {other} of the pose stream {name} is none of the contract's")),
-    }
-}
-
-fn unique<'a>(names: impl Iterator<Item = &'a str>, what: &str) -> Result<(), Fault> {
-    let mut names: Vec<&str> = names.collect();
-    names.sort_unstable();
-    match names.windows(2).find(|w| w[0] == w[1]) {
-        Some(twice) => Err(format!("two {what} have the name `{}`", twice[0])),
-        None => Ok(()),
     }
 }
 
@@ -225,9 +96,10 @@ impl Dataset for PluginDataset {
 
     fn image(&self, camera: &str, index: usize) -> DataResult<Image> {
         let (place, _) = self.find_camera(camera)?;
-        must(
+        let what = || format!("image {index} of camera {camera}");
+        let image = ask(
             &self.library,
-            &|| format!("image {index} of camera {camera}"),
+            &what,
             // SAFETY: an open data set.
             |out, message| unsafe {
                 (self.library.calls.image)(self.handle.raw(), place, index, out, message)
@@ -239,6 +111,34 @@ impl Dataset for PluginDataset {
                 // SAFETY: the plugin's promise.
                 let data = unsafe { border::list(image.data, image.data_bytes, "bytes of the image") }?;
                 values::image(&rows, format, data)
+            },
+        )?;
+        if let Some(image) = image {
+            return Ok(image);
+        }
+        match self.image_file(camera, index)? {
+            Some(file) => image_file::decode(&file)
+                .map_err(|e| DataError::of_kind(e.kind(), format!("{}: {}", what(), one_line(&e)))),
+            None => Err(DataError::new(format!(
+                "{}: the call returned VICE_NONE, which it must not where there is no `image_file`",
+                what()
+            ))
+            .at(&self.library.path)
+            .hint(MISTAKE)),
+        }
+    }
+
+    fn image_file(&self, camera: &str, index: usize) -> DataResult<Option<Vec<u8>>> {
+        let (place, _) = self.find_camera(camera)?;
+        let Some(call) = self.library.calls.optional.image_file else { return Ok(None) };
+        ask(
+            &self.library,
+            &|| format!("stored image {index} of camera {camera}"),
+            // SAFETY: an open data set.
+            |out, message| unsafe { call(self.handle.raw(), place, index, out, message) },
+            |file: &contract::ImageFile| {
+                // SAFETY: the plugin's promise.
+                values::image_file(unsafe { border::list(file.data, file.data_bytes, "bytes of the file") }?)
             },
         )
     }
@@ -269,7 +169,7 @@ impl Dataset for PluginDataset {
             DataError::new(format!("there is no pose stream `{stream}`")).hint(format!("known: {known}"))
         })?;
         let what = || format!("pose stream {stream}");
-        if !entry.relative {
+        if entry.kind != StreamKind::Motions {
             return must(
                 &self.library,
                 &what,
@@ -297,7 +197,7 @@ impl Dataset for PluginDataset {
     }
 
     fn is_relative(&self, stream: &str) -> bool {
-        self.streams.iter().any(|s| s.name == stream && s.relative)
+        self.streams.iter().any(|s| s.name == stream && s.kind != StreamKind::Poses)
     }
 
     fn imu(&self) -> DataResult<Arc<[ImuSample]>> {
@@ -390,6 +290,27 @@ impl Dataset for PluginDataset {
             values::floor,
         )?;
         Ok(floor.unwrap_or(flat))
+    }
+
+    fn suspicions(&self) -> Vec<Suspicion> {
+        let Some(call) = self.library.calls.optional.suspicions else { return Vec::new() };
+        let suspicions = ask(
+            &self.library,
+            &|| "suspicions".to_string(),
+            // SAFETY: an open data set.
+            |out, message| unsafe { call(self.handle.raw(), out, message) },
+            |list: &contract::Suspicions| {
+                // SAFETY: the plugin's promise.
+                let list = unsafe { border::list(list.suspicions, list.count, "suspicions") }?;
+                // SAFETY: the plugin's promise.
+                list.iter().map(|s| unsafe { values::suspicion(s) }).collect()
+            },
+        );
+        // What a plugin fails to say must not be taken for all being well.
+        suspicions.map_or_else(
+            |error| vec![Suspicion::new("plugin-fault", self.format(), one_line(&error))],
+            Option::unwrap_or_default,
+        )
     }
 
     fn facts(&self) -> Vec<Fact> {

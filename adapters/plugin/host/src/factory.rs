@@ -5,7 +5,8 @@ use std::path::Path;
 use vice_core::dataset::{Dataset, DatasetFactory, FormatInfo, OpenOptions, Probe};
 use vice_core::error::DataResult;
 
-use crate::dataset::{self, PluginDataset};
+use crate::dataset::PluginDataset;
+use crate::handle;
 use crate::library::Plugin;
 
 impl DatasetFactory for Plugin {
@@ -14,7 +15,7 @@ impl DatasetFactory for Plugin {
     }
 
     fn probe(&self, path: &Path) -> Probe {
-        dataset::probe(self.library(), path).unwrap_or_else(|error| {
+        handle::probe(self.library(), path).unwrap_or_else(|error| {
             tracing::warn!("asking plugin {} about {}: {error}", Self::info(self).name, path.display());
             Probe::No
         })

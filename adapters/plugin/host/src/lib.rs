@@ -8,6 +8,8 @@
 //! border       texts and lists read from the other side
 //! ask          one call: its turn, its code, its answer
 //! values       the contract's values as the core's, checked
+//! handle       what a path is, and an open data set as the plugin calls it
+//! description  what it says that it has
 //! dataset      a data set of a plugin
 //! factory      a plugin as a format
 //! conformance  what an adapter is expected to do, as a suite that anyone can run
@@ -22,7 +24,9 @@ mod binary;
 mod border;
 pub mod conformance;
 mod dataset;
+mod description;
 mod factory;
+mod handle;
 mod host_log;
 mod library;
 mod place;

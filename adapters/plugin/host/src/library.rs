@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use vice_abi::contract::{
-    self, ABI_VERSION, CameraStampCall, Entry, FLAG_THREAD_SAFE, FreeCall, PluginTable, ProbeCall,
+    self, ABI_OLDEST, ABI_VERSION, CameraStampCall, Entry, FLAG_THREAD_SAFE, FreeCall, PluginTable, ProbeCall,
 };
 use vice_core::dataset::{FormatInfo, SettingInfo};
 use vice_core::error::{DataError, DataResult, one_line};
@@ -35,6 +35,7 @@ pub(crate) struct Library {
     pub(crate) info: FormatInfo,
     pub(crate) calls: Calls,
     table_size: u32,
+    abi_version: u32,
     /// Held during a call where calls must not overlap.
     turn: Option<Mutex<()>>,
 }
@@ -65,6 +66,8 @@ pub(crate) struct Optional {
     pub(crate) cloud: Option<contract::Call<contract::Cloud>>,
     pub(crate) floor: Option<contract::StampCall<contract::Floor>>,
     pub(crate) facts: Option<contract::Call<contract::Facts>>,
+    pub(crate) image_file: Option<contract::FrameCall<contract::ImageFile>>,
+    pub(crate) suspicions: Option<contract::Call<contract::Suspicions>>,
 }
 
 impl Plugin {
@@ -111,6 +114,7 @@ impl Plugin {
                 info,
                 calls: calls(&table).map_err(bug)?,
                 table_size: table.struct_size,
+                abi_version: table.abi_version,
                 turn: (table.flags & FLAG_THREAD_SAFE == 0).then(Mutex::default),
             }),
         })
@@ -134,6 +138,11 @@ impl Plugin {
     /// Whether its table is that of this program's contract in full, or an older and shorter one.
     pub fn complete_table(&self) -> bool {
         self.library.table_size as usize >= size_of::<PluginTable>()
+    }
+
+    /// The version of the contract that it was built for, at most [`ABI_VERSION`].
+    pub fn abi_version(&self) -> u32 {
+        self.library.abi_version
     }
 
     pub(crate) fn library(&self) -> &Arc<Library> {
@@ -193,10 +202,10 @@ unsafe fn copy_table(table: *const PluginTable) -> Result<PluginTable, Fault> {
     let head = table.cast::<u32>();
     // SAFETY: version and size come first.
     let (version, size) = unsafe { (head.read(), head.add(1).read() as usize) };
-    if version != ABI_VERSION {
+    if !(ABI_OLDEST..=ABI_VERSION).contains(&version) {
         let what = if version > ABI_VERSION { "update VICE" } else { "rebuild the plugin" };
         return Err(format!(
-            "it speaks version {version} of the contract, this program {ABI_VERSION}; {what}"
+            "it speaks version {version} of the contract, this program {ABI_OLDEST} to {ABI_VERSION}; {what}"
         ));
     }
     if size < PluginTable::REQUIRED_SIZE {
@@ -268,6 +277,8 @@ fn calls(table: &PluginTable) -> Result<Calls, Fault> {
             cloud: table.cloud,
             floor: table.floor,
             facts: table.facts,
+            image_file: table.image_file,
+            suspicions: table.suspicions,
         },
     })
 }

@@ -6,10 +6,11 @@ use vice_core::camera::{Camera, Model};
 use vice_core::dataset::{DepthImage, Floor, Image, PixelFormat, Plane};
 use vice_core::frames::Rigid;
 use vice_core::imu::{self, ImuSample, InertialState};
+use vice_core::suspicion::Suspicion;
 use vice_core::time::Stamp;
 use vice_core::trajectory::{RelativeMotion, Trajectory};
 
-use crate::border::Fault;
+use crate::border::{self, Fault};
 
 /// A length this near to 1 is rounding, and the numbers are kept to the bit: those of a format written in Rust are the same
 /// through a plugin.
@@ -123,6 +124,16 @@ pub(crate) fn image(rows: &Rows, format: PixelFormat, data: &[u8]) -> Result<Ima
     Image::new(rows.width, rows.height, format, rows.tight(data)?).map_err(text)
 }
 
+/// A stored file, which browsers and decoders know by its first bytes.
+pub(crate) fn image_file(bytes: &[u8]) -> Result<Vec<u8>, Fault> {
+    const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
+    const JPEG: &[u8] = &[0xff, 0xd8, 0xff];
+    if !bytes.starts_with(PNG) && !bytes.starts_with(JPEG) {
+        return Err(format!("its {} bytes are neither a PNG nor a JPEG", bytes.len()));
+    }
+    Ok(bytes.to_vec())
+}
+
 /// `z_m` holds the rows, each `stride / 4` values.
 pub(crate) fn depth(stamp_ns: i64, rows: &Rows, z_m: &[f32]) -> Result<DepthImage, Fault> {
     let (width, stride) = (rows.width as usize, rows.stride / size_of::<f32>());
@@ -206,6 +217,26 @@ fn plane<F>(floor: &contract::Floor) -> Result<Plane<F>, Fault> {
         return Ok(Plane::from_unit(Unit::new_unchecked(normal), floor.d_m));
     }
     Plane::new(floor.normal, floor.d_m).map_err(text)
+}
+
+/// # Safety
+/// Its texts are as [`contract::Text::bytes`] wants them.
+#[allow(unsafe_code)]
+pub(crate) unsafe fn suspicion(given: &contract::Suspicion) -> Result<Suspicion, Fault> {
+    // SAFETY: the caller's promise, for all of these.
+    let (code, about, message, evidence, advice) = unsafe {
+        (
+            border::name(given.code, "the code of a suspicion")?,
+            border::text(given.about, "what a suspicion is about")?,
+            border::text(given.message, "the message of a suspicion")?,
+            border::text(given.evidence, "the evidence of a suspicion")?,
+            border::text(given.advice, "the advice of a suspicion")?,
+        )
+    };
+    if message.trim().is_empty() || given.count == 0 {
+        return Err(format!("the suspicion `{code}` has no message, or was seen 0 times"));
+    }
+    Ok(Suspicion::new(&code, about, message).evidence(evidence).advice(advice).times(given.count))
 }
 
 #[cfg(test)]

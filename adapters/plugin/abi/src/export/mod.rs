@@ -1,6 +1,7 @@
 //! A [`DatasetFactory`] as the table of a plugin.
 
 mod calls;
+mod failure;
 mod guard;
 mod log;
 mod owned;
@@ -106,18 +107,21 @@ fn plugin(factory: Box<dyn DatasetFactory>) -> Plugin {
         close: Some(calls::close),
         release: Some(owned::release),
         describe: Some(calls::describe),
-        camera: Some(calls::camera),
-        frames: Some(calls::frames),
-        image: Some(calls::image),
-        body_from_camera: Some(calls::body_from_camera),
-        trajectory: Some(calls::trajectory),
+        camera: Some(calls::cameras::camera),
+        frames: Some(calls::cameras::frames),
+        image: Some(calls::cameras::image),
+        body_from_camera: Some(calls::cameras::body_from_camera),
+        trajectory: Some(calls::motion::trajectory),
+        // Relative streams are `STREAM_CHAINED`: the core's trait hands over chained poses.
         relative_motions: None,
-        imu: Some(calls::imu),
-        inertial_state: Some(calls::inertial_state),
-        depth_image: Some(calls::depth_image),
-        cloud: Some(calls::cloud),
-        floor: Some(calls::floor),
-        facts: Some(calls::facts),
+        imu: Some(calls::motion::imu),
+        inertial_state: Some(calls::motion::inertial_state),
+        depth_image: Some(calls::cameras::depth_image),
+        cloud: Some(calls::scene::cloud),
+        floor: Some(calls::scene::floor),
+        facts: Some(calls::scene::facts),
+        image_file: Some(calls::cameras::image_file),
+        suspicions: Some(calls::scene::suspicions),
     };
     // The strings and lists keep their place in memory when they are moved.
     Plugin { factory, table, _info: info, _offers: offers, _settings: settings }

@@ -5,6 +5,7 @@ use std::any::Any;
 use std::ffi::c_void;
 
 use vice_core::dataset::Fact;
+use vice_core::suspicion::Suspicion;
 
 use super::guard;
 use crate::contract::{self, Text};
@@ -57,5 +58,29 @@ impl Facts {
         let facts =
             held.iter().map(|f| contract::Fact { section: text(&f.section), text: text(&f.text) }).collect();
         Box::new(Self { facts, _held: held })
+    }
+}
+
+/// Suspicions, and those of the contract that point at them.
+pub(super) struct Suspicions {
+    pub(super) suspicions: Vec<contract::Suspicion>,
+    _held: Vec<Suspicion>,
+}
+
+impl Suspicions {
+    pub(super) fn new(held: Vec<Suspicion>) -> Box<Self> {
+        let text = |s: &String| Text::from_bytes(s.as_bytes());
+        let suspicions = held
+            .iter()
+            .map(|s| contract::Suspicion {
+                code: text(&s.code),
+                about: text(&s.about),
+                message: text(&s.message),
+                evidence: text(&s.evidence),
+                advice: text(&s.advice),
+                count: s.count,
+            })
+            .collect();
+        Box::new(Self { suspicions, _held: held })
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use vice_abi::contract::ABI_VERSION;
 use vice_core::dataset::{Dataset, Probe};
 use vice_core::error::one_line;
 
@@ -42,7 +43,12 @@ impl Check<'_> {
             if !safe {
                 self.missing("it is not thread-safe: calls are made one after another, which is slower");
             }
-            if !whole {
+            let version = plugin.abi_version();
+            if version < ABI_VERSION {
+                self.missing(format!(
+                    "it is built for version {version} of the contract, this program's is {ABI_VERSION}: stored images, suspicions and kinds of errors need that one"
+                ));
+            } else if !whole {
                 self.missing("its table is shorter than this program's: newer calls are not used");
             }
         }

@@ -4,11 +4,13 @@
 //! are words for the adapter's author: what is wrong, and what a user would see of it.
 
 mod cameras;
+mod files;
 mod format;
 mod motion;
 mod raw;
 mod robust;
 mod scene;
+mod words;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -85,11 +87,13 @@ pub fn check(subject: &Subject<'_>, thorough: &Thoroughness, tell: &mut dyn FnMu
         let lists = check.lists(dataset.as_ref());
         for camera in &lists.cameras {
             check.camera(dataset.as_ref(), camera);
+            check.stored_images(dataset.as_ref(), camera);
         }
         check.streams(dataset.as_ref(), &lists);
         check.inertial(dataset.as_ref(), &lists);
         check.depth(dataset.as_ref(), &lists);
         check.scene(dataset.as_ref(), &lists);
+        check.words(dataset.as_ref());
         check.unknown_names(dataset.as_ref(), &lists);
         check.odd_stamps(dataset.as_ref(), &lists);
         check.several_at_once(dataset.as_ref(), &lists);

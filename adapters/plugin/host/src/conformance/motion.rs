@@ -13,11 +13,18 @@ impl Check<'_> {
             self.step(format!("pose stream {name}"));
             match dataset.trajectory(name) {
                 Ok(trajectory) => {
+                    let relative = dataset.is_relative(name);
+                    let chained = if relative { ", chained from relative motions" } else { "" };
                     self.good(format!(
-                        "pose stream {name}: {} poses, one each {}",
+                        "pose stream {name}: {} poses, one each {}{chained}",
                         trajectory.len(),
                         trajectory.median_period()
                     ));
+                    if relative && name == GROUND_TRUTH {
+                        self.suspicious(
+                            "the ground truth is relative: it starts anywhere, so that no depth can be asked at its poses",
+                        );
+                    }
                     let apart =
                         lists.extent().is_some_and(|(a, b)| trajectory.end() < a || trajectory.start() > b);
                     if apart {

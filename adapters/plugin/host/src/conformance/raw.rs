@@ -6,7 +6,8 @@ use std::ffi::c_void;
 use vice_abi::contract::{self, Message, Text};
 
 use super::{Check, Lists};
-use crate::dataset::Handle;
+use crate::ask::kind;
+use crate::handle::Handle;
 use crate::library::{Library, Plugin};
 
 /// What stands after a message buffer and must stay.
@@ -30,7 +31,7 @@ impl Check<'_> {
     fn small_message(&mut self, library: &Library) {
         const ROOM: usize = 8;
         let mut bytes = [CANARY; 256];
-        let mut message = Message { data: bytes.as_mut_ptr(), capacity: ROOM, length: 0 };
+        let mut message = message(&mut bytes[..ROOM]);
         let mut dataset: *mut c_void = std::ptr::null_mut();
         let turn = library.turn();
         // SAFETY: a path that lives during the call, and a buffer larger than it is said to be.
@@ -45,8 +46,10 @@ impl Check<'_> {
         drop(turn);
         if bytes[ROOM..].iter().any(|b| *b != CANARY) {
             self.fault("it writes beyond the `capacity` of the message: memory of VICE is overwritten");
-        } else if code == contract::ERROR && message.length == 0 {
+        } else if kind(code).is_some() && message.length == 0 {
             self.fault("it fails to open without a message: set `length` to that of the text");
+        } else if message.hint_start.saturating_add(message.hint_length) > message.length {
+            self.fault("the hint of its message lies outside the text: `hint_start` and `hint_length` are places in it");
         } else {
             self.good("an error message is cut where there is little room");
         }
@@ -77,6 +80,7 @@ impl Check<'_> {
                 ask(|o| unsafe { (calls.trajectory)(data, place, o, m) })
             });
         }
+        self.optional_places(library, handle, lists);
         for (index, camera) in lists.cameras.iter().enumerate() {
             for place in [camera.frames.len(), usize::MAX] {
                 self.is_error(library, "image", place, |m| {
@@ -89,6 +93,54 @@ impl Check<'_> {
         }
     }
 
+    /// The same of optional calls, which may also say that there is none.
+    fn optional_places(&mut self, library: &Library, handle: &Handle, lists: &Lists) {
+        let (calls, data) = (&library.calls.optional, handle.raw());
+        let cameras = lists.cameras.len();
+        // SAFETY of the calls: as above.
+        for place in [cameras, usize::MAX] {
+            if let Some(call) = calls.image_file {
+                self.is_not_given(library, "image_file", place, |m| {
+                    ask(|o| unsafe { call(data, place, 0, o, m) })
+                });
+            }
+            if let Some(call) = calls.depth_image {
+                self.is_not_given(library, "depth_image", place, |m| {
+                    ask(|o| unsafe { call(data, place, 0, o, m) })
+                });
+            }
+        }
+        for place in [lists.streams.len(), usize::MAX] {
+            if let Some(call) = calls.relative_motions {
+                self.is_not_given(library, "relative_motions", place, |m| {
+                    ask(|o| unsafe { call(data, place, o, m) })
+                });
+            }
+        }
+    }
+
+    fn is_not_given(
+        &mut self,
+        library: &Library,
+        call: &str,
+        place: usize,
+        make: impl FnOnce(*mut Message) -> i32,
+    ) {
+        self.step(format!("`{call}` for place {place}, which is not there"));
+        let mut bytes = [0; 512];
+        let mut message = message(&mut bytes);
+        let turn = library.turn();
+        let code = make(&raw mut message);
+        drop(turn);
+        match code {
+            contract::OK => self.fault(format!("`{call}` gives something for place {place}, which is not there")),
+            contract::EXCEPTION => self.fault(format!(
+                "`{call}` for place {place} ends in an exception or panic: check the place and return VICE_ERROR"
+            )),
+            _ => {}
+        }
+    }
+
     fn is_error(
         &mut self,
         library: &Library,
@@ -98,13 +150,13 @@ impl Check<'_> {
     ) {
         self.step(format!("`{call}` for place {place}, which is not there"));
         let mut bytes = [0; 512];
-        let mut message = Message { data: bytes.as_mut_ptr(), capacity: bytes.len(), length: 0 };
+        let mut message = message(&mut bytes);
         let turn = library.turn();
         let code = make(&raw mut message);
         drop(turn);
         match code {
-            contract::ERROR if message.length > 0 => {}
-            contract::ERROR => self.fault(format!("`{call}` for place {place} fails without a message")),
+            code if kind(code).is_some() && message.length > 0 => {}
+            code if kind(code).is_some() => self.fault(format!("`{call}` for place {place} fails without a message")),
             contract::EXCEPTION => self.fault(format!(
                 "`{call}` for place {place} ends in an exception or panic: check the place and return VICE_ERROR"
             )),
@@ -120,7 +172,7 @@ impl Check<'_> {
         let Some(index) = lists.cameras.iter().position(|c| !c.frames.is_empty()) else { return };
         let stamps = || {
             let mut out = Stamps::default();
-            let mut message = Message { data: std::ptr::null_mut(), capacity: 0, length: 0 };
+            let mut message = message(&mut []);
             // SAFETY: an open data set, a message of no room.
             let code =
                 unsafe { (library.calls.frames)(handle.raw(), index, &raw mut out.0, &raw mut message) };
@@ -151,6 +203,11 @@ impl Check<'_> {
             false => self.fault("an answer changes before it is released, or is not given twice"),
         }
     }
+}
+
+/// Room for a message.
+const fn message(bytes: &mut [u8]) -> Message {
+    Message { data: bytes.as_mut_ptr(), capacity: bytes.len(), length: 0, hint_start: 0, hint_length: 0 }
 }
 
 /// No stamps.

@@ -27,6 +27,10 @@ impl Check<'_> {
             ("image", dataset.image(no_such, 0).is_ok()),
             ("body_from_camera", dataset.body_from_camera(no_such, stamp).is_ok()),
             ("trajectory", dataset.trajectory(no_such).is_ok()),
+            ("a stored image", matches!(dataset.image_file(no_such, 0), Ok(Some(_)))),
+            ("a depth image", matches!(dataset.depth_image(no_such, 0), Ok(Some(_)))),
+            ("has_depth", dataset.has_depth(no_such)),
+            ("is_relative", dataset.is_relative(no_such)),
         ];
         let answered: Vec<&str> = answers.iter().filter(|(_, is_ok)| *is_ok).map(|(what, _)| *what).collect();
         if !answered.is_empty() {
@@ -172,6 +176,7 @@ fn fingerprint(dataset: &dyn Dataset, lists: &Lists, turn: usize) -> u64 {
             let camera = &lists.cameras[job - cameras];
             for place in spread(camera.frames.len(), 3) {
                 add(&mut hasher, dataset.image(&camera.name, place), |h, image| image.data().hash(h));
+                add(&mut hasher, dataset.image_file(&camera.name, place), |h, file| file.hash(h));
                 add(&mut hasher, dataset.body_from_camera(&camera.name, camera.frames[place]), |h, pose| {
                     pose.to_row_major().map(f64::to_bits).hash(h);
                 });

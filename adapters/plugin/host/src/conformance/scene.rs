@@ -1,4 +1,4 @@
-//! What is known of the scene: depth images, scan, floor; and facts.
+//! What is known of the scene: depth images, scan, floor.
 
 use vice_core::dataset::{CloudSource, Dataset, Floor};
 use vice_core::error::one_line;
@@ -95,11 +95,6 @@ impl Check<'_> {
                 }
                 Err(error) => self.error("no floor at the first frame", &error),
             }
-        }
-        self.step("facts");
-        let facts = dataset.facts();
-        if facts.iter().any(|f| f.section.trim().is_empty() || f.text.trim().is_empty()) {
-            self.fault("a fact for `vice info` has no heading or no text");
         }
     }
 }

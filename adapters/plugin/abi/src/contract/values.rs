@@ -1,75 +1,8 @@
-//! The contract, as `include/vice_plugin.h` says it in C: the same names, the same layout (a test compiles the header and
-//! compares). Its comment on conventions, memory, errors and threads is not repeated here.
-//!
-//! Everything that the other side fills is valid for any bits: there is no enum, no `bool`, no reference, and function
-//! pointers are optional.
+//! What crosses the border.
 
 use std::ffi::c_void;
 
-/// Version of the contract. A plugin of another version is not loaded.
-pub const ABI_VERSION: u32 = 0;
-/// Name of the one exported symbol, an [`Entry`].
-pub const ENTRY_SYMBOL: &str = "vice_plugin";
-
-/// The call did what it says.
-pub const OK: i32 = 0;
-/// There is none: no depth image for this frame, no cloud, no state.
-pub const NONE: i32 = 1;
-/// It failed; the message says why.
-pub const ERROR: i32 = 2;
-/// An exception or a panic was caught: a bug of the plugin.
-pub const EXCEPTION: i32 = 3;
-
-/// Flag of a [`PluginTable`]: its calls may overlap.
-pub const FLAG_THREAD_SAFE: u64 = 1;
-
-/// Not this format.
-pub const PROBE_NO: i32 = 0;
-/// A data set of this format.
-pub const PROBE_YES: i32 = 1;
-/// A folder of several data sets.
-pub const PROBE_COLLECTION: i32 = 2;
-
-/// No coefficients.
-pub const MODEL_PINHOLE: i32 = 0;
-/// k1 k2 p1 p2, or k1 k2 p1 p2 k3.
-pub const MODEL_RADTAN: i32 = 1;
-/// k1 k2 p1 p2 k3 k4 k5 k6.
-pub const MODEL_RATIONAL: i32 = 2;
-/// k1 k2 k3 k4.
-pub const MODEL_EQUIDISTANT: i32 = 3;
-/// Most coefficients that a model has.
-pub const MAX_COEFFICIENTS: usize = 8;
-
-/// Flag of a [`CameraEntry`]: depth images can be expected.
-pub const CAMERA_HAS_DEPTH: u64 = 1;
-
-/// A stream of poses.
-pub const STREAM_POSES: i32 = 0;
-/// A stream of relative motions.
-pub const STREAM_RELATIVE: i32 = 1;
-
-/// One byte a pixel.
-pub const PIXELS_GRAY8: i32 = 0;
-/// Three bytes a pixel: red, green, blue.
-pub const PIXELS_RGB8: i32 = 1;
-
-/// The points are in a PLY file.
-pub const CLOUD_PLY: i32 = 0;
-/// The points are in memory.
-pub const CLOUD_POINTS: i32 = 1;
-
-/// The floor is known in the world.
-pub const FLOOR_WORLD: i32 = 0;
-/// The floor is known in the body at the key frame.
-pub const FLOOR_BODY: i32 = 1;
-
-/// A line about something that failed.
-pub const LOG_ERROR: i32 = 1;
-/// A line about data that is used all the same.
-pub const LOG_WARN: i32 = 2;
-/// A line for those who asked for more.
-pub const LOG_INFO: i32 = 3;
+use super::constants::MAX_COEFFICIENTS;
 
 /// UTF-8, not ended by a zero.
 #[repr(C)]
@@ -91,6 +24,10 @@ pub struct Message {
     pub capacity: usize,
     /// Length of the whole text, even where it is cut.
     pub length: usize,
+    /// Where in the text it begins to say what to do about it.
+    pub hint_start: usize,
+    /// How many bytes say so; 0 where nothing does.
+    pub hint_length: usize,
 }
 
 /// What the host gives.
@@ -244,6 +181,18 @@ pub struct Image {
     pub format: i32,
     /// From the start of a row to the start of the next.
     pub row_stride_bytes: u32,
+    /// The bytes.
+    pub data: *const u8,
+    /// How many.
+    pub data_bytes: usize,
+    /// To be released.
+    pub owner: *mut c_void,
+}
+
+/// The stored file of an image: PNG or JPEG.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct ImageFile {
     /// The bytes.
     pub data: *const u8,
     /// How many.
@@ -428,86 +377,32 @@ pub struct Facts {
     pub owner: *mut c_void,
 }
 
-/// The exported symbol.
-pub type Entry = unsafe extern "C" fn(*const Host) -> *const PluginTable;
-/// `probe(path, out, message)`.
-pub type ProbeCall = unsafe extern "C" fn(Text, *mut Probe, *mut Message) -> i32;
-/// `open(path, settings, setting_count, dataset, message)`.
-pub type OpenCall = unsafe extern "C" fn(Text, *const Setting, usize, *mut *mut c_void, *mut Message) -> i32;
-/// `close(dataset)` and `release(owner)`.
-pub type FreeCall = unsafe extern "C" fn(*mut c_void);
-/// `call(dataset, out, message)`.
-pub type Call<T> = unsafe extern "C" fn(*mut c_void, *mut T, *mut Message) -> i32;
-/// `call(dataset, index, out, message)`: of a camera or a stream.
-pub type IndexCall<T> = unsafe extern "C" fn(*mut c_void, usize, *mut T, *mut Message) -> i32;
-/// `call(dataset, camera_index, frame_index, out, message)`.
-pub type FrameCall<T> = unsafe extern "C" fn(*mut c_void, usize, usize, *mut T, *mut Message) -> i32;
-/// `call(dataset, stamp_ns, out, message)`.
-pub type StampCall<T> = unsafe extern "C" fn(*mut c_void, i64, *mut T, *mut Message) -> i32;
-/// `call(dataset, camera_index, stamp_ns, out, message)`.
-pub type CameraStampCall<T> = unsafe extern "C" fn(*mut c_void, usize, i64, *mut T, *mut Message) -> i32;
-
-/// What a plugin hands over. From [`PluginTable::relative_motions`] on the calls are optional.
+/// Something in the data that may make the numbers wrong.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
-pub struct PluginTable {
-    /// [`ABI_VERSION`] of the plugin.
-    pub abi_version: u32,
-    /// Size of this structure in the plugin.
-    pub struct_size: u32,
-    /// `FLAG_…`.
-    pub flags: u64,
-    /// Name of the format.
-    pub name: Text,
-    /// Version of the plugin.
-    pub version: Text,
-    /// One line for `vice formats`.
-    pub description: Text,
-    /// What data sets can have.
-    pub offers: *const Text,
-    /// How many.
-    pub offer_count: usize,
-    /// Settings.
-    pub settings: *const SettingInfo,
-    /// How many.
-    pub setting_count: usize,
-    /// Whether a path looks like this format.
-    pub probe: Option<ProbeCall>,
-    /// Opens a data set.
-    pub open: Option<OpenCall>,
-    /// Closes a data set.
-    pub close: Option<FreeCall>,
-    /// Frees what an `owner` stands for.
-    pub release: Option<FreeCall>,
-    /// What the data set has.
-    pub describe: Option<Call<DatasetInfo>>,
-    /// Calibration.
-    pub camera: Option<IndexCall<Camera>>,
-    /// Stamps of frames.
-    pub frames: Option<IndexCall<Stamps>>,
-    /// Pixels.
-    pub image: Option<FrameCall<Image>>,
-    /// Pose of the camera in the body at a stamp.
-    pub body_from_camera: Option<CameraStampCall<Rigid>>,
-    /// A stream of poses.
-    pub trajectory: Option<IndexCall<Poses>>,
-    /// A stream of relative motions.
-    pub relative_motions: Option<IndexCall<Motions>>,
-    /// Inertial samples.
-    pub imu: Option<Call<ImuSamples>>,
-    /// The reference state at a stamp.
-    pub inertial_state: Option<StampCall<InertialState>>,
-    /// The depth image of a frame.
-    pub depth_image: Option<FrameCall<DepthImage>>,
-    /// The scan.
-    pub cloud: Option<Call<Cloud>>,
-    /// The floor at a key frame.
-    pub floor: Option<StampCall<Floor>>,
-    /// More for `vice info`.
-    pub facts: Option<Call<Facts>>,
+pub struct Suspicion {
+    /// A stable name, for programs.
+    pub code: Text,
+    /// What it is about; empty for the whole data set.
+    pub about: Text,
+    /// What looks wrong.
+    pub message: Text,
+    /// The numbers that make it look so, or empty.
+    pub evidence: Text,
+    /// What to do about it, or empty.
+    pub advice: Text,
+    /// How often the same was seen.
+    pub count: u64,
 }
 
-impl PluginTable {
-    /// A table of this size has all the calls that are not optional.
-    pub const REQUIRED_SIZE: usize = std::mem::offset_of!(Self, relative_motions);
+/// What looks wrong.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct Suspicions {
+    /// Each once.
+    pub suspicions: *const Suspicion,
+    /// How many.
+    pub count: usize,
+    /// To be released.
+    pub owner: *mut c_void,
 }
