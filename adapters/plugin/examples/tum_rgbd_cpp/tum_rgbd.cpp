@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <limits>
 
 #include "calibration.hpp"
@@ -51,6 +53,12 @@ std::vector<Frame> read_list(const std::string &folder, const std::string &name)
     return frames;
 }
 
+std::vector<std::uint8_t> read_bytes(const std::string &path) {
+    std::ifstream file(path, std::ios::binary);
+    if (!file) throw vice::Error(path + ": cannot be read");
+    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
 // groundtruth.txt: `stamp tx ty tz qx qy qz qw`, world from camera.
 std::vector<vice_pose> read_poses(const std::string &path) {
     std::vector<vice_pose> poses;
@@ -88,7 +96,7 @@ class Sequence final : public vice::Dataset {
     std::vector<vice::CameraName> cameras() override { return {{"rgb", !depth_.empty()}}; }
     std::vector<vice::StreamName> streams() override {
         if (!is_file(folder_ + "/groundtruth.txt")) return {};
-        return {{"ground-truth", false}};
+        return {{"ground-truth", VICE_STREAM_POSES}};
     }
     vice_camera camera(std::size_t) override { return calibration_.camera; }
 
@@ -98,12 +106,9 @@ class Sequence final : public vice::Dataset {
         return stamps;
     }
 
-    vice::Image image(std::size_t, std::size_t index) override {
-        const Frame &frame = colour_.at(check(index));
-        Png png = read_png(frame.path);
-        if (png.bits != 8 || (png.channels != 1 && png.channels != 3))
-            throw vice::Error(frame.path + ": expected 8 bits, gray or colour");
-        return {png.width, png.height, png.channels == 3 ? VICE_PIXELS_RGB8 : VICE_PIXELS_GRAY8, std::move(png.data)};
+    // As it is stored: VICE decodes it.
+    std::optional<std::vector<std::uint8_t>> image_file(std::size_t, std::size_t index) override {
+        return read_bytes(colour_.at(check(index)).path);
     }
 
     vice_rigid body_from_camera(std::size_t, std::int64_t) override { return {{0, 0, 0}, {1, 0, 0, 0}}; }

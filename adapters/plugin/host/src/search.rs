@@ -1,11 +1,11 @@
-//! Where plugins lie that nobody named: the folders of `VICE_PLUGIN_PATH`, then the user's own.
+//! Where plugins lie that nobody named: the folders and files of `VICE_PLUGIN_PATH`, then the user's own.
 //!
 //! Never the working directory and never a data set: what lies there came with the data.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// The variable that lists folders, separated as in `PATH`.
+/// The variable that lists folders and files, separated as in `PATH`.
 pub const PATH_VARIABLE: &str = "VICE_PLUGIN_PATH";
 
 /// Libraries that lie where plugins are, in the order they are looked at, and remarks about folders that were not.
@@ -22,24 +22,27 @@ pub fn user_folder() -> Option<PathBuf> {
     directories::ProjectDirs::from("", "", "vice").map(|d| d.data_dir().join("plugins"))
 }
 
-/// Looks in the folders of `VICE_PLUGIN_PATH` and the user's own.
+/// Looks at the folders and files of `VICE_PLUGIN_PATH`, and in the user's own folder.
 pub fn find() -> Found {
     find_in(std::env::var_os(PATH_VARIABLE).as_deref(), user_folder().as_deref())
 }
 
 fn find_in(listed: Option<&OsStr>, user: Option<&Path>) -> Found {
     let mut found = Found::default();
-    for folder in listed.map(std::env::split_paths).into_iter().flatten() {
-        if folder.as_os_str().is_empty() {
+    for path in listed.map(std::env::split_paths).into_iter().flatten() {
+        if path.as_os_str().is_empty() {
             continue;
         }
-        if folder.is_relative() {
-            let shown = folder.display();
-            found.remarks.push(format!("{PATH_VARIABLE}: {shown} is left out: only absolute folders count"));
+        if path.is_relative() {
+            let shown = path.display();
+            found.remarks.push(format!("{PATH_VARIABLE}: {shown} is left out: only absolute paths count"));
             continue;
         }
-        if let Err(error) = look(&folder, &mut found.libraries) {
-            found.remarks.push(format!("{PATH_VARIABLE}: {} is left out: {error}", folder.display()));
+        if path.is_file() {
+            // Named by itself, it need not be called as libraries are.
+            found.libraries.push(path);
+        } else if let Err(error) = look(&path, &mut found.libraries) {
+            found.remarks.push(format!("{PATH_VARIABLE}: {} is left out: {error}", path.display()));
         }
     }
     if let Some(folder) = user.filter(|f| f.is_dir())
@@ -71,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn absolute_folders_are_looked_at_in_order() {
+    fn absolute_folders_and_files_are_looked_at_in_order() {
         let (a, b) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let library = |folder: &Path, name: &str| {
             let path = folder.join(format!("{name}{}", std::env::consts::DLL_SUFFIX));
@@ -80,9 +83,12 @@ mod tests {
         };
         let (z, y, u) = (library(a.path(), "z"), library(a.path(), "y"), library(b.path(), "u"));
         std::fs::write(a.path().join("notes.txt"), "").unwrap();
-        let listed = std::env::join_paths([Path::new(""), Path::new("."), a.path(), Path::new("/no/such")]);
+        let c = tempfile::tempdir().unwrap();
+        let (one, _beside) = (library(c.path(), "one"), library(c.path(), "beside"));
+        let listed = [Path::new(""), Path::new("."), &one, a.path(), Path::new("/no/such")];
+        let listed = std::env::join_paths(listed);
         let found = find_in(Some(&listed.unwrap()), Some(b.path()));
-        assert_eq!(found.libraries, [y, z, u]);
+        assert_eq!(found.libraries, [one, y, z, u]);
         assert_eq!(found.remarks.len(), 2, "{:?}", found.remarks);
         assert!(found.remarks[0].contains("only absolute"));
         assert_eq!(find_in(None, None), Found::default());

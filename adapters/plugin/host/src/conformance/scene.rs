@@ -67,7 +67,7 @@ impl Check<'_> {
     pub(super) fn scene(&mut self, dataset: &dyn Dataset, lists: &Lists) {
         self.step("scan of the scene");
         match dataset.cloud() {
-            Ok(None) => self.missing("no point cloud: `--depth zmap` and `mesh` need --cloud or --mesh"),
+            Ok(None) => self.missing("no point cloud: `--depth zmap` and `--depth mesh` will not work"),
             Ok(Some(cloud)) => match cloud.source {
                 CloudSource::Ply(path) if path.is_file() => self.good(format!("a scan: {}", path.display())),
                 CloudSource::Ply(path) => self.fault(format!("the scan {} is no file", path.display())),
