@@ -20,7 +20,7 @@ fn packaged() -> Option<String> {
 
 /// The commit of the checkout that this file lies in, and not that of a repository around an unpacked archive.
 fn checked_out() -> Option<String> {
-    git(&["ls-files", "--error-unmatch", "build.rs"])?;
+    git(&["ls-files", "--error-unmatch", "Cargo.toml"])?;
     for file in ["HEAD", "logs/HEAD"] {
         let path = git(&["rev-parse", "--git-path", file])?;
         // A file that is not there would count as changed each time.

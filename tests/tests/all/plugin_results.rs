@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use vice_core::dataset::{DatasetFactory, OpenOptions};
+use vice_core::dataset::{DatasetFactory, GROUND_TRUTH, OpenOptions};
 use vice_core::error::one_line;
 use vice_host::{LoadOptions, Plugin};
 use vice_tests::{plugin, shared, vice};
@@ -97,7 +97,7 @@ fn nothing_is_lost_on_the_way() {
     let folder = tempfile::tempdir().unwrap();
     small_euroc(folder.path());
     // A row twice, which is left out and said.
-    let list = folder.path().join("mav0/cam0/data.csv");
+    let list = folder.path().join("mav0/state_groundtruth_estimate0/data.csv");
     let rows = std::fs::read_to_string(&list).unwrap();
     let last = rows.lines().last().unwrap();
     std::fs::write(&list, format!("{rows}{last}\n")).unwrap();
@@ -107,6 +107,8 @@ fn nothing_is_lost_on_the_way() {
     let [built_in, through] = formats.map(|f| f.open(folder.path(), &options).unwrap());
     let file = built_in.image_file("cam0", 0).unwrap().unwrap();
     assert_eq!(through.image_file("cam0", 0).unwrap(), Some(file));
+    let [one, two] = [&built_in, &through].map(|d| d.trajectory(GROUND_TRUTH).unwrap());
+    assert_eq!((one.stamps(), one.poses()), (two.stamps(), two.poses()));
     let suspicions = built_in.suspicions();
     assert!(!suspicions.is_empty());
     assert_eq!(through.suspicions(), suspicions);
