@@ -22,7 +22,7 @@ pub const ERROR_CONTRADICTORY: i32 = 6;
 /// It failed: a setting makes no sense, whatever the data.
 pub const ERROR_USAGE: i32 = 7;
 
-/// Flag of a [`PluginTable`]: its calls may overlap.
+/// Flag of a [`PluginTable`](super::PluginTable): its calls may overlap.
 pub const FLAG_THREAD_SAFE: u64 = 1;
 
 /// Not this format.
@@ -43,7 +43,7 @@ pub const MODEL_EQUIDISTANT: i32 = 3;
 /// Most coefficients that a model has.
 pub const MAX_COEFFICIENTS: usize = 8;
 
-/// Flag of a [`CameraEntry`]: depth images can be expected.
+/// Flag of a [`CameraEntry`](super::CameraEntry): depth images can be expected.
 pub const CAMERA_HAS_DEPTH: u64 = 1;
 
 /// A stream of poses.

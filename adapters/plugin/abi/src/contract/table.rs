@@ -33,7 +33,7 @@ pub type CameraStampCall<T> = unsafe extern "C" fn(*mut c_void, usize, i64, *mut
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct PluginTable {
-    /// [`ABI_VERSION`] of the plugin.
+    /// [`ABI_VERSION`](super::ABI_VERSION) of the plugin.
     pub abi_version: u32,
     /// Size of this structure in the plugin.
     pub struct_size: u32,

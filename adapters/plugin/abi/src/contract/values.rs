@@ -34,7 +34,7 @@ pub struct Message {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct Host {
-    /// [`ABI_VERSION`] of the host.
+    /// [`ABI_VERSION`](super::ABI_VERSION) of the host.
     pub abi_version: u32,
     /// Size of this structure in the host.
     pub struct_size: u32,
