@@ -1,6 +1,7 @@
 /*
  * A small plugin that is good as it stands, and bad in one way with each macro. It reads any folder that has hostile.txt: one
- * camera of 8 x 4 px with depth, three frames, the truth, a stream of motions, three inertial samples, three points.
+ * camera of 8 x 4 px with depth, three frames that are also stored as PNG, the truth, a stream of motions, the truth as if it
+ * were chained, three inertial samples, three points, a suspicion.
  */
 #include <math.h>
 #include <signal.h>
@@ -58,6 +59,14 @@ static int32_t fail(vice_message *message, const char *what) {
 #else
     message->length = n;
     memcpy(message->data, what, n < message->capacity ? n : message->capacity);
+#if defined(HINT)
+    message->hint_start = n - 13;
+    message->hint_length = 12;
+    return VICE_ERROR_USAGE;
+#elif defined(BAD_HINT)
+    message->hint_start = n;
+    message->hint_length = (size_t)-1;
+#endif
     return VICE_ERROR;
 #endif
 }
@@ -98,7 +107,7 @@ static int32_t open_dataset(vice_text path, const vice_setting *settings, size_t
     fflush(stdout);
 #endif
     if (!is_there(path)) {
-        snprintf(line, sizeof line, "%.*s: has no hostile.txt", (int)path.length, path.data);
+        snprintf(line, sizeof line, "%.*s: has no hostile.txt (see `labels`)", (int)path.length, path.data);
         return fail(message, line);
     }
 #if defined(NULL_DATASET)
@@ -114,7 +123,7 @@ static void release(void *owner) { free(owner); }
 
 static int32_t describe(void *dataset, vice_dataset_info *out, vice_message *message) {
     static vice_camera_entry cameras[2];
-    static vice_stream_entry streams[2];
+    static vice_stream_entry streams[3];
     (void)dataset;
     (void)message;
     cameras[0].name = text("cam");
@@ -122,11 +131,13 @@ static int32_t describe(void *dataset, vice_dataset_info *out, vice_message *mes
     streams[0].name = text("ground-truth");
     streams[1].name = text("steps");
     streams[1].kind = VICE_STREAM_RELATIVE;
+    streams[2].name = text("chained");
+    streams[2].kind = VICE_STREAM_CHAINED;
     out->name = text("a run");
     out->cameras = cameras;
     out->camera_count = 1;
     out->streams = streams;
-    out->stream_count = 2;
+    out->stream_count = 3;
 #if defined(SAME_NAMES)
     cameras[1] = cameras[0];
     out->camera_count = 2;
@@ -203,6 +214,9 @@ static int32_t image(void *dataset, size_t index, size_t frame, vice_image *out,
 #if !defined(GIVES_ALL)
     if (index != 0 || frame >= FRAMES) return fail(message, "there is no such frame");
 #endif
+#if defined(NO_PICTURE) || defined(PICTURE_IS_FILE)
+    return VICE_NONE;
+#endif
     enter();
     out->width_px = WIDTH;
     out->height_px = HEIGHT;
@@ -212,6 +226,9 @@ static int32_t image(void *dataset, size_t index, size_t frame, vice_image *out,
     out->owner = calloc(1, out->data_bytes);
     out->data = out->owner;
     memset(out->owner, (int)frame, out->data_bytes);
+#if defined(OTHER_PICTURE)
+    memset(out->owner, 200, out->data_bytes);
+#endif
     usleep(200);
 #if defined(SHORT_STRIDE)
     out->row_stride_bytes = WIDTH - 1;
@@ -243,7 +260,7 @@ static int32_t trajectory(void *dataset, size_t index, vice_poses *out, vice_mes
     vice_pose *poses;
     size_t i;
     (void)dataset;
-    if (index != 0) return fail(message, "there is no such stream");
+    if (index != 0 && index != 2) return fail(message, "there is no such stream");
     poses = calloc(FRAMES, sizeof *poses);
     for (i = 0; i < FRAMES; ++i) {
         poses[i].stamp_ns = stamp(i);
@@ -263,118 +280,7 @@ static int32_t trajectory(void *dataset, size_t index, vice_poses *out, vice_mes
     return VICE_OK;
 }
 
-static int32_t relative_motions(void *dataset, size_t index, vice_motions *out, vice_message *message) {
-    static vice_motion motions[2];
-    size_t i;
-    (void)dataset;
-    if (index != 1) return fail(message, "there is no such stream");
-    for (i = 0; i < 2; ++i) {
-        motions[i].from_ns = stamp(i);
-        motions[i].to_ns = stamp(i + 1);
-        motions[i].later_from_earlier.rotation_wxyz[0] = 1;
-    }
-#if defined(BROKEN_MOTIONS)
-    motions[1].from_ns += 1;
-#endif
-    out->motions = motions;
-    out->count = 2;
-    return VICE_OK;
-}
-
-static int32_t imu(void *dataset, vice_imu_samples *out, vice_message *message) {
-    static vice_imu_sample samples[3];
-    size_t i;
-    (void)dataset;
-    (void)message;
-    for (i = 0; i < 3; ++i) {
-        samples[i].stamp_ns = stamp(i);
-        samples[i].accel_body_m_s2[2] = 9.81;
-    }
-#if defined(NAN_IMU)
-    samples[1].gyro_body_rad_s[2] = NAN;
-#endif
-    out->samples = samples;
-    out->count = 3;
-    return VICE_OK;
-}
-
-static int32_t inertial_state(void *dataset, int64_t at, vice_inertial_state *out, vice_message *message) {
-    (void)dataset;
-    (void)message;
-    out->stamp_ns = at;
-    out->world_from_body.rotation_wxyz[0] = 1;
-#if defined(NAN_STATE)
-    out->velocity_world_m_s[1] = INFINITY;
-#endif
-    return VICE_OK;
-}
-
-static int32_t depth_image(void *dataset, size_t index, size_t frame, vice_depth_image *out, vice_message *message) {
-    float *z_m;
-    size_t i;
-    (void)dataset;
-    if (index != 0 || frame >= FRAMES) return fail(message, "there is no such frame");
-    z_m = malloc(WIDTH * HEIGHT * sizeof *z_m);
-    for (i = 0; i < WIDTH * HEIGHT; ++i) z_m[i] = i % 3 == 0 ? NAN : 1.0f;
-    out->stamp_ns = stamp(frame);
-    out->width_px = WIDTH;
-    out->height_px = HEIGHT;
-    out->z_m = z_m;
-    out->data_bytes = WIDTH * HEIGHT * sizeof *z_m;
-    out->row_stride_bytes = WIDTH * sizeof *z_m;
-    out->owner = z_m;
-#if defined(ODD_DEPTH_STRIDE)
-    out->row_stride_bytes += 2;
-#elif defined(SHORT_DEPTH)
-    out->data_bytes -= 4;
-#endif
-    return VICE_OK;
-}
-
-static int32_t cloud(void *dataset, vice_cloud *out, vice_message *message) {
-    static const vice_point points[3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-    (void)dataset;
-    (void)message;
-    out->kind = VICE_CLOUD_POINTS;
-    out->points = points;
-    out->count = 3;
-    out->world_from_cloud.rotation_wxyz[0] = 1;
-#if defined(BAD_CLOUD)
-    out->kind = 3;
-#elif defined(NO_PLY)
-    out->kind = VICE_CLOUD_PLY;
-#endif
-    return VICE_OK;
-}
-
-static int32_t floor_at(void *dataset, int64_t at, vice_floor *out, vice_message *message) {
-    (void)dataset;
-    (void)message;
-    (void)at;
-    out->frame = VICE_FLOOR_WORLD;
-    out->normal[2] = 1;
-#if defined(NO_NORMAL)
-    out->normal[2] = 0;
-#elif defined(BAD_FLOOR)
-    out->frame = 2;
-#endif
-    return VICE_OK;
-}
-
-static int32_t facts(void *dataset, vice_facts *out, vice_message *message) {
-    static vice_fact fact;
-    (void)dataset;
-    (void)message;
-    fact.section = text("notes");
-    fact.text = text("a fact");
-#if defined(BAD_FACT)
-    fact.text = text("caf\xe9");
-#endif
-    out->facts = &fact;
-    out->count = 1;
-    the_host->log(the_host->context, VICE_LOG_WARN, text("a remark of the plugin"));
-    return VICE_OK;
-}
+#include "hostile_more.h"
 
 #if defined(NO_SYMBOL)
 #define vice_plugin another_symbol
@@ -406,6 +312,10 @@ const vice_plugin_table *vice_plugin(const vice_host *host) {
     table.cloud = cloud;
     table.floor = floor_at;
     table.facts = facts;
+#if !defined(NO_PICTURE)
+    table.image_file = image_file;
+#endif
+    table.suspicions = suspicions;
 #if defined(NEWER_ABI)
     table.abi_version = VICE_ABI_VERSION + 1;
 #elif defined(SHORT_TABLE)

@@ -6,7 +6,7 @@
 struct Run : vice::Dataset {
     std::string name() override { return "a run"; }
     std::vector<vice::CameraName> cameras() override { return {{"cam", false}}; }
-    std::vector<vice::StreamName> streams() override { return {{"ground-truth", false}, {"number", false}}; }
+    std::vector<vice::StreamName> streams() override { return {{"ground-truth", VICE_STREAM_POSES}, {"number", VICE_STREAM_POSES}}; }
     vice_camera camera(std::size_t) override { return {8, 4, 6, 6, 3.5, 1.5, VICE_MODEL_PINHOLE, 0, {}}; }
     std::vector<std::int64_t> frames_ns(std::size_t) override { return {1000000000, 1100000000}; }
     vice::Image image(std::size_t, std::size_t) override { throw vice::Error("frames.csv:3: the film is torn"); }

@@ -68,7 +68,8 @@ pub fn plugin(format: &str) -> PathBuf {
     build(&format!("vice-plugin-{format}")).join(format!("{DLL_PREFIX}vice_adapter_{format}{DLL_SUFFIX}"))
 }
 
-/// Compiles a source of `tests/plugins` into a shared library `name` of a folder, with the system's C or C++ compiler.
+/// Compiles a source of `tests/plugins` into a shared library `name` of a folder, with the system's C or C++ compiler. A source
+/// in a folder of its own brings the header along, as of the version that it was written for.
 pub fn compile_plugin(source: &str, defines: &[&str], folder: &Path, name: &str) -> PathBuf {
     let library = folder.join(format!("lib{name}{}", std::env::consts::DLL_SUFFIX));
     let (variable, usual, standard) = match source.ends_with(".cpp") {
@@ -80,7 +81,7 @@ pub fn compile_plugin(source: &str, defines: &[&str], folder: &Path, name: &str)
         .args([standard, "-O1", "-g", "-fPIC", "-shared", "-fvisibility=hidden"])
         .args(defines.iter().map(|d| format!("-D{d}")))
         .arg("-I")
-        .arg(root().join("adapters/abi/include"))
+        .arg(root().join("adapters/plugin/abi/include"))
         .arg("-o")
         .arg(&library)
         .arg(root().join("tests/plugins").join(source))

@@ -1,9 +1,8 @@
-//! Labels in minutes: a point is placed once, the image tracker carries it through the flight, and a person corrects
+//! Labels in minutes: a point is placed once, the image tracker ([`vice_track`]) carries it through the flight, and a person corrects
 //! what it doubts.
 //!
 //! | module | what |
 //! | --- | --- |
-//! | [`tracker`] | where a point of one frame is in the next ones |
 //! | [`store`] | the labels while they are edited: journal, undo, the file |
 //! | [`jobs`] | tracking in the background |
 //! | [`estimates`] | what pose streams and depth add |
@@ -20,4 +19,3 @@ mod scene;
 pub mod server;
 pub mod store;
 pub mod suggest;
-pub mod tracker;

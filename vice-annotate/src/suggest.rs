@@ -2,7 +2,7 @@
 
 use vice_core::camera::Pixel;
 
-use crate::tracker::{Corner, Pyramid, corners, lookalike};
+use vice_track::{Corner, Pyramid, corners, lookalike};
 
 /// Corners with a smaller share than this of the best one's score are no suggestions.
 const MIN_SHARE: f64 = 0.15;

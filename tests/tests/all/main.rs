@@ -25,6 +25,7 @@ mod locobot_oracle;
 mod plugin_check;
 mod plugin_hostile;
 mod plugin_new;
+mod plugin_old;
 mod plugin_places;
 mod plugin_results;
 mod plugin_tum;

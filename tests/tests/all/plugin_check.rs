@@ -1,11 +1,12 @@
 //! `vice plugin check` on plugins that end the process, hang or lose memory; the suite on every built-in format.
 
+use std::fs;
 use std::path::Path;
 use std::process::Command;
 
 use vice_core::dataset::{DatasetFactory, OpenOptions};
 use vice_host::conformance::{Event, Subject, Thoroughness, Verdict, check};
-use vice_tests::{compile_plugin, plugin, shared, vice, vice_program};
+use vice_tests::{compile_plugin, plugin, root, shared, vice, vice_program};
 
 use crate::plugin_hostile::{Hostile, text};
 
@@ -82,26 +83,26 @@ fn valgrind_finds_nothing() {
 }
 
 /// A sequence in the EuRoC layout that is read fast: two black images, a floor below.
-fn small_euroc(folder: &Path) {
+pub(crate) fn small_euroc(folder: &Path) {
     let camera = folder.join("mav0/cam0");
     let truth = folder.join("mav0/state_groundtruth_estimate0");
-    std::fs::create_dir_all(camera.join("data")).unwrap();
-    std::fs::create_dir_all(&truth).unwrap();
+    fs::create_dir_all(camera.join("data")).unwrap();
+    fs::create_dir_all(&truth).unwrap();
     let stamps = [1403715280562142976_i64, 1403715280612143104];
     let mut list = "#timestamp [ns],filename\n".to_string();
     let mut poses = "#timestamp\n".to_string();
     for stamp in stamps {
         list += &format!("{stamp},{stamp}.png\n");
         poses += &format!("{stamp},0.0,0.0,2.0,1.0,0.0,0.0,0.0\n");
-        std::fs::write(camera.join(format!("data/{stamp}.png")), PNG_8X4).unwrap();
+        fs::write(camera.join(format!("data/{stamp}.png")), PNG_8X4).unwrap();
     }
-    std::fs::write(camera.join("data.csv"), list).unwrap();
-    std::fs::write(truth.join("data.csv"), poses).unwrap();
+    fs::write(camera.join("data.csv"), list).unwrap();
+    fs::write(truth.join("data.csv"), poses).unwrap();
     let sensor = "%YAML:1.0\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0.0, -1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, \
                   0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0]\nrate_hz: 20\nresolution: [8, 4]\ncamera_model: pinhole\n\
                   intrinsics: [6.0, 6.0, 3.5, 1.5]\ndistortion_model: radial-tangential\n\
                   distortion_coefficients: [0.0, 0.0, 0.0, 0.0]\n";
-    std::fs::write(camera.join("sensor.yaml"), sensor).unwrap();
+    fs::write(camera.join("sensor.yaml"), sensor).unwrap();
 }
 
 /// A black image of 8 x 4 px, 8 bit gray.
@@ -144,4 +145,50 @@ fn our_plugins_pass_their_check() {
         assert_eq!(run.code, 0, "{format}: {}{}", run.stdout, run.stderr);
         assert!(run.stdout.contains("0 suspicious, 0 faults"), "{}", run.stdout);
     }
+}
+
+/// The suite asks all that the trait has: a method that is added there is missed here.
+#[test]
+fn each_method_of_the_trait_is_asked() {
+    let core = fs::read_to_string(root().join("vice-core/src/dataset/mod.rs")).unwrap();
+    let methods = core.split("pub trait Dataset: ").nth(1).unwrap().split("\n}\n").next().unwrap();
+    let methods: Vec<&str> =
+        methods.split("\n    fn ").skip(1).map(|m| m.split('(').next().unwrap()).collect();
+    assert!(methods.len() > 15 && methods.contains(&"suspicions"), "{methods:?}");
+    let suite = suite();
+    for method in methods {
+        assert!(suite.contains(&format!("dataset.{method}(")), "the suite does not ask `{method}`");
+    }
+}
+
+/// What the check advises can be done.
+#[test]
+fn options_that_the_check_names_exist() {
+    let help: String = ["evaluate", "formats", "plugin check", "info"]
+        .map(|c| vice(&[c.split(' ').collect(), vec!["--help"]].concat()).stdout)
+        .concat();
+    let suite = suite();
+    let mut names: Vec<&str> = suite
+        .match_indices("--")
+        .map(|(at, _)| {
+            let rest = &suite[at + 2..];
+            &rest[..rest.find(|c: char| !c.is_ascii_lowercase() && c != '-').unwrap_or(rest.len())]
+        })
+        .filter(|name| !name.is_empty())
+        .collect();
+    names.sort_unstable();
+    names.dedup();
+    assert!(names.len() >= 4, "{names:?}");
+    for name in names {
+        let option =
+            help.lines().any(|l| l.trim_start().split([' ', '=', ',']).any(|w| w == format!("--{name}")));
+        assert!(option, "`--{name}` is advised, but no option");
+    }
+}
+
+/// The source of the suite.
+fn suite() -> String {
+    let folder = root().join("adapters/plugin/host/src/conformance");
+    let files = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
+    files.map(|f| fs::read_to_string(f).unwrap()).collect()
 }

@@ -65,9 +65,27 @@ fn the_plugin_as_it_stands_is_good() {
         assert!(info.stdout.contains(words), "{words}: {}", info.stdout);
     }
     assert!(info.stderr.contains("warning: a remark of the plugin"), "{}", info.stderr);
+    let doubt = "cam: the pictures are dark: mean 1 of 255, 3 times (switch on the light)";
+    assert!(format!("{}{}", info.stdout, info.stderr).contains(doubt), "{}{}", info.stdout, info.stderr);
     let check = good.check(&[]);
     assert_eq!(check.code, 0, "{}{}", check.stdout, check.stderr);
-    assert!(check.stdout.contains("one after another"), "it is not thread-safe: {}", check.stdout);
+    for words in [
+        "one after another",
+        "3 of 3 images are given as they are stored",
+        "pose stream steps: 3 poses, one each 0.1 s, chained from relative motions",
+        "pose stream chained: 3 poses, one each 0.1 s, chained from relative motions",
+        "it doubts the data: cam: the pictures are dark",
+    ] {
+        assert!(check.stdout.contains(words), "`{words}` is not in {}", check.stdout);
+    }
+    // A plugin need not decode: its stored images are decoded for it.
+    let stored = Hostile::new(&["PICTURE_IS_FILE"]).check(&[]);
+    assert_eq!(stored.code, 0, "{}{}", stored.stdout, stored.stderr);
+    assert!(
+        stored.stdout.contains("3 images were read (all), of the size of the calibration"),
+        "{}",
+        stored.stdout
+    );
 }
 
 #[test]
@@ -175,6 +193,21 @@ fn what_crosses_the_border_is_validated() {
         ("NO_PLY", "the path is empty"),
         ("NO_NORMAL", "the normal of the plane is zero"),
         ("BAD_FLOOR", "frame 2 of the floor"),
+        ("NO_PICTURE", "which it must not where there is no `image_file`"),
+        ("NULL_FILE", "the pointer to bytes of the file is null, though 68 are announced"),
+        ("HUGE_FILE", "more than can be"),
+        ("OTHER_FILE", "its 6 bytes are neither a PNG nor a JPEG"),
+        ("BROKEN_FILE", "it cannot be decoded"),
+        ("OTHER_PICTURE", "labels would be set on another picture"),
+        ("GIVES_ALL_FILES", "stored image 3 of camera cam is given"),
+        ("NO_CODE", "the code of a suspicion is empty"),
+        ("BAD_CODE", "the code `So Dark` of a suspicion should be a word"),
+        ("BAD_SUSPICION", "the message of a suspicion is not UTF-8"),
+        ("NEVER_SEEN", "was seen 0 times"),
+        ("SAID_TWICE", "is said twice of the same"),
+        ("MANY_SUSPICIONS", "suspicions are announced, more than can be"),
+        ("NULL_SUSPICIONS", "the pointer to suspicions is null"),
+        ("BAD_HINT", "the hint of its message lies outside the text"),
         ("NO_MESSAGE", "it fails to open without a message"),
         ("OVERRUN_MESSAGE", "writes beyond the `capacity`"),
         ("UNKNOWN_CODE", "returned 77"),
@@ -202,7 +235,12 @@ fn errors_are_shown_whatever_their_message() {
     one_error(&opening("BAD_MESSAGE"), &["is closed", "its message is not UTF-8"]);
     one_error(&opening("LONG_MESSAGE"), &["xxxxxxxx", "…"]);
     one_error(&opening("UNKNOWN_CODE"), &["the call returned 77"]);
-    one_error(&opening("PLAIN"), &["has no hostile.txt"]);
+    one_error(&opening("BAD_HINT"), &["has no hostile.txt (see `labels`)"]);
+    one_error(&opening("PLAIN"), &["has no hostile.txt (see `labels`)"]);
+    // A hint is said as any other: fields of a request as options. The kind decides the exit code.
+    let hint = opening("HINT");
+    one_error(&hint, &["has no hostile.txt (see --labels)"]);
+    assert_eq!(hint.code, 2, "{}", hint.stderr);
 }
 
 #[test]

@@ -36,6 +36,9 @@ fn folders_are_searched_and_what_does_not_load_is_said() {
     assert_eq!(info.code, 0, "{}", info.stderr);
     let warnings = info.stderr.lines().filter(|l| l.starts_with("warning: plugin")).count();
     assert_eq!(warnings, 2, "{}", info.stderr);
+    // A file by itself: what lies beside it is not looked at.
+    let alone = vice_with(Some(&good.library), home.path(), &["formats"]);
+    assert!(alone.stdout.contains("hostile 1.2.3") && !alone.stdout.contains("twin"), "{}", alone.stdout);
     // The user's folder.
     let mine = home.path().join("share/vice/plugins");
     fs::create_dir_all(&mine).unwrap();

@@ -2,8 +2,12 @@
 
 use std::path::Path;
 
+use vice_core::dataset::{DatasetFactory, GROUND_TRUTH, OpenOptions};
+use vice_core::error::one_line;
+use vice_host::{LoadOptions, Plugin};
 use vice_tests::{plugin, shared, vice};
 
+use crate::plugin_check::small_euroc;
 use crate::plugin_hostile::text;
 
 /// Evaluates with and without the plugin and compares the documents.
@@ -85,4 +89,37 @@ fn information_and_images_through_plugins() {
         ["image.png", "floor.npy"].map(|f| std::fs::read(out.join(f)).unwrap())
     };
     assert!(depth("built_in", &[]) == depth("through", &["--plugin", text(&library)]));
+}
+
+/// What figures do not show: stored images, suspicions, and errors with their kind and hint.
+#[test]
+fn nothing_is_lost_on_the_way() {
+    let folder = tempfile::tempdir().unwrap();
+    small_euroc(folder.path());
+    // A row twice, which is left out and said.
+    let list = folder.path().join("mav0/state_groundtruth_estimate0/data.csv");
+    let rows = std::fs::read_to_string(&list).unwrap();
+    let last = rows.lines().last().unwrap();
+    std::fs::write(&list, format!("{rows}{last}\n")).unwrap();
+    let loaded = Plugin::load(plugin("euroc"), &LoadOptions { allow_writable: true }).unwrap();
+    let formats: [&dyn DatasetFactory; 2] = [&vice_euroc::Euroc, &loaded];
+    let options = OpenOptions::default();
+    let [built_in, through] = formats.map(|f| f.open(folder.path(), &options).unwrap());
+    let file = built_in.image_file("cam0", 0).unwrap().unwrap();
+    assert_eq!(through.image_file("cam0", 0).unwrap(), Some(file));
+    let [one, two] = [&built_in, &through].map(|d| d.trajectory(GROUND_TRUTH).unwrap());
+    assert_eq!((one.stamps(), one.poses()), (two.stamps(), two.poses()));
+    let suspicions = built_in.suspicions();
+    assert!(!suspicions.is_empty());
+    assert_eq!(through.suspicions(), suspicions);
+    for path in ["/no/such/folder", folder.path().join("mav0/cam0/data").to_str().unwrap()] {
+        let [one, two] = formats.map(|f| f.open(Path::new(path), &options).err().unwrap());
+        assert_eq!(
+            (one.kind(), one.hint_text(), one_line(&one)),
+            (two.kind(), two.hint_text(), one_line(&two))
+        );
+    }
+    let odd = OpenOptions { settings: [("no-such".to_string(), "1".to_string())].into() };
+    let [one, two] = formats.map(|f| f.open(folder.path(), &odd).err());
+    assert_eq!(one.as_ref().map(|e| (e.kind(), one_line(e))), two.as_ref().map(|e| (e.kind(), one_line(e))));
 }

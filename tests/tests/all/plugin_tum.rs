@@ -15,7 +15,7 @@ fn library() -> &'static Path {
         let library = folder.path().join("libtum_rgbd.so");
         let output = Command::new("make")
             .arg("-C")
-            .arg(root().join("adapters/examples/tum_rgbd_cpp"))
+            .arg(root().join("adapters/plugin/examples/tum_rgbd_cpp"))
             .arg(format!("OUT={}", library.display()))
             .arg("CXXFLAGS=-O1 -Werror")
             .output()

@@ -7,9 +7,7 @@ use vice_core::label::{Observation, ObservationSource, Provenance};
 
 use crate::desk::Desk;
 use crate::store::{Cell, Document};
-use crate::tracker::{
-    DOUBT_CONFIDENCE, Outcome, PointTrack, Pyramid, TRACKER_VERSION, TrackError, TrackOptions,
-};
+use vice_track::{DOUBT_CONFIDENCE, Outcome, PointTrack, Pyramid, TRACKER_VERSION, TrackError, TrackOptions};
 
 /// A point on its way through the frames.
 pub(super) struct Lane {

@@ -11,7 +11,7 @@ use super::lane::{Fate, Lane};
 use super::{Direction, EndReason, Job, LaneEnd, Listener, Progress, TrackRequest};
 use crate::desk::Desk;
 use crate::store::{By, StoreError};
-use crate::tracker::Pyramid;
+use vice_track::Pyramid;
 
 /// How often what was found is written and told.
 const BATCH: Duration = Duration::from_millis(200);

@@ -15,8 +15,13 @@ pub struct File {
 pub enum Dependency {
     /// A checkout.
     Path(String),
-    /// A repository, at the tag of this version.
-    Git(String),
+    /// A repository, at a commit or at its newest.
+    Git {
+        /// Its address.
+        url: String,
+        /// The commit, in full.
+        commit: Option<String>,
+    },
 }
 
 impl Dependency {
@@ -25,16 +30,17 @@ impl Dependency {
         // A TOML string with quotes and backslashes escaped, which Rust writes alike.
         match self {
             Self::Path(path) => format!("{{ path = {:?} }}", format!("{path}/{folder}")),
-            Self::Git(url) => format!("{{ git = {url:?}, tag = \"v{}\" }}", env!("CARGO_PKG_VERSION")),
+            Self::Git { url, commit: Some(commit) } => format!("{{ git = {url:?}, rev = {commit:?} }}"),
+            Self::Git { url, commit: None } => format!("{{ git = {url:?} }}"),
         }
     }
 }
 
 macro_rules! template {
-    ($language:literal, $path:literal) => {
+    ($folder:literal, $path:literal) => {
         File {
             path: $path,
-            text: include_str!(concat!("../../templates/plugin_", $language, "/", $path, ".txt")).to_string(),
+            text: include_str!(concat!("../../templates/", $folder, "/", $path, ".txt")).to_string(),
         }
     };
 }
@@ -42,26 +48,31 @@ macro_rules! template {
 /// A crate.
 pub fn rust(name: &str, vice: &Dependency) -> Vec<File> {
     let files = vec![
-        template!("rust", "Cargo.toml"),
-        template!("rust", "README.md"),
-        template!("rust", "src/lib.rs"),
-        template!("rust", "src/dataset.rs"),
-        template!("rust", "tests/check.rs"),
+        template!("plugin_rust", "Cargo.toml"),
+        template!("plugin_rust", "README.md"),
+        template!("plugin_rust", "src/lib.rs"),
+        template!("plugin_rust", "src/dataset.rs"),
+        template!("plugin_rust", "src/table.rs"),
+        template!("plugin_rust", "tests/check.rs"),
+        template!("plugin", "make_example.sh"),
     ];
-    let (abi, core) = (vice.on("adapters/abi"), vice.on("vice-core"));
-    fill(files, &[("name", name), ("Name", &camel(name)), ("vice_abi", &abi), ("vice_core", &core)])
+    let packages = ["adapters/plugin/abi", "vice-core", "adapters/files"];
+    let [abi, core, shared] = packages.map(|folder| vice.on(folder));
+    let vice = [("vice_abi", &*abi), ("vice_core", &*core), ("vice_files", &*shared)];
+    fill(files, &[&[("name", name), ("Name", &*camel(name))], &vice[..]].concat())
 }
 
 /// A Makefile and one source, with the header beside them.
 pub fn cpp(name: &str) -> Vec<File> {
     let mut files = vec![
-        template!("cpp", "Makefile"),
-        template!("cpp", "README.md"),
-        template!("cpp", "plugin.cpp"),
-        template!("cpp", "make_example.sh"),
+        template!("plugin_cpp", "Makefile"),
+        template!("plugin_cpp", "README.md"),
+        template!("plugin_cpp", "plugin.cpp"),
+        template!("plugin", "make_example.sh"),
     ];
     files.push(File { path: "vice_plugin.h", text: vice_abi::HEADER.to_string() });
     files.push(File { path: "vice_plugin.hpp", text: vice_abi::CPP_HEADER.to_string() });
+    files.push(File { path: "vice_plugin_export.hpp", text: vice_abi::CPP_EXPORT_HEADER.to_string() });
     fill(files, &[("name", name), ("Name", &camel(name))])
 }
 
@@ -115,10 +126,10 @@ mod tests {
 
     #[test]
     fn nothing_is_left_to_fill_in_and_nothing_overwritten() {
-        let git = Dependency::Git("a\"b".to_string());
+        let git = Dependency::Git { url: "a\"b".to_string(), commit: None };
         for files in [rust("my_robot", &git), cpp("my_robot")] {
             for file in &files {
-                for key in ["@name@", "@Name@", "@vice_abi@", "@vice_core@"] {
+                for key in ["@name@", "@Name@", "@vice_abi@", "@vice_core@", "@vice_files@"] {
                     assert!(!file.text.contains(key), "{}", file.path);
                 }
             }
@@ -127,6 +138,8 @@ mod tests {
             write(&folder.path().join("new"), &files).unwrap();
             assert!(write(&folder.path().join("new"), &files).unwrap_err().to_string().contains("not empty"));
         }
-        assert!(git.on("x").contains(r#"git = "a\"b""#));
+        assert_eq!(git.on("x"), r#"{ git = "a\"b" }"#);
+        let pinned = Dependency::Git { url: "u".to_string(), commit: Some("1f".to_string()) };
+        assert_eq!(pinned.on("x"), r#"{ git = "u", rev = "1f" }"#);
     }
 }

@@ -10,10 +10,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::Value;
-use vice_annotate::tracker::{Pyramid, corners, track_translation};
 use vice_core::camera::{Camera, Model, Pixel};
 use vice_core::frames::{Rigid, WorldFromCamera};
 use vice_depth::{Cloud, CloudOptions, ZMapDepth, ZMapOptions, depth_image, read_ply_points};
+use vice_track::{Pyramid, corners, track_translation};
 
 use crate::files::{Files, POSES, SCAN_POINTS};
 use crate::table::{Rounds, Side};

@@ -23,7 +23,7 @@ pub(crate) struct Args {
     /// Rust: a checkout of VICE that the project depends on.
     #[arg(long, value_name = "DIR", conflicts_with = "vice_git")]
     vice_path: Option<PathBuf>,
-    /// Rust: in place of a checkout, the address of VICE's repository; the tag is that of this version.
+    /// Rust: in place of a checkout, the address of VICE's repository, at the commit that this program was built from.
     #[arg(long, value_name = "URL")]
     vice_git: Option<String>,
 }
@@ -75,23 +75,39 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         files.iter().map(|f| f.path).collect::<Vec<_>>().join(", "),
         folder.display()
     ))?;
+    if let Some(url) = &args.vice_git {
+        terminal::print(&match COMMIT {
+            Some(commit) => {
+                format!("it depends on {url} at {commit}, the commit that this program was built from\n")
+            }
+            None => format!(
+                "it depends on the newest of {url}: this program does not know which commit it was built from. Add \
+                 rev = \"...\" in Cargo.toml to keep to one\n"
+            ),
+        })?;
+    }
     Ok(Outcome::Done)
 }
 
-/// How the project in Rust depends on a package of VICE: `path = "..."` with the package's folder for `{}`, or git.
+/// The commit that this program was built from, where that is known.
+const COMMIT: Option<&str> = option_env!("VICE_COMMIT");
+
+/// How the project in Rust depends on VICE.
 fn dependency(args: &Args) -> anyhow::Result<project::Dependency> {
     match (&args.vice_path, &args.vice_git) {
         (Some(path), _) => {
             let no_checkout = || usage(format!("--vice-path: {} is no checkout of VICE", path.display()));
             // Absolute, so that the project can be moved.
             let path = path.canonicalize().map_err(|_| no_checkout())?;
-            if !path.join("adapters/abi/Cargo.toml").is_file() {
+            if !path.join("adapters/plugin/abi/Cargo.toml").is_file() {
                 return Err(no_checkout());
             }
             let text = path.to_str().ok_or_else(|| usage("--vice-path: the path is not UTF-8"))?;
             Ok(project::Dependency::Path(text.to_string()))
         }
-        (None, Some(url)) => Ok(project::Dependency::Git(url.clone())),
+        (None, Some(url)) => {
+            Ok(project::Dependency::Git { url: url.clone(), commit: COMMIT.map(str::to_string) })
+        }
         (None, None) => Err(usage(
             "a project in Rust depends on VICE: give --vice-path (a checkout) or --vice-git (the repository's address)",
         )),
