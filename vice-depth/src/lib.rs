@@ -29,4 +29,4 @@ pub use floor_fit::{FloorFit, FloorFitOptions, fit_floor_to_cloud, fit_floor_to_
 pub use image::{DepthMap, depth_image};
 pub use mesh::{Mesh, MeshDepth};
 pub use zcam::{ZCamDepth, ZCamOptions};
-pub use zmap::{ZMapDepth, ZMapOptions};
+pub use zmap::{Interpolation, ZMapDepth, ZMapOptions};

@@ -1,4 +1,4 @@
-//! The third step: triangulate the points that are left, in pixels, and interpolate `z` linearly.
+//! The third step: triangulate the points that are left, in pixels, and interpolate `z`, linearly or by natural neighbours.
 //!
 //! What is interpolated is `z` itself, not `1/z`, over the Delaunay triangulation of the distorted pixels. Four
 //! points on a circle have two such triangulations, and a regular grid of points is full of them: to make the
@@ -12,6 +12,7 @@ use vice_core::camera::Pixel;
 use vice_core::depth::{DepthMiss, DepthSample};
 use vice_core::error::{DataError, DataResult};
 
+use super::natural::Natural;
 use super::queries::Queries;
 use super::select::{Facing, Seen, View, Window};
 
@@ -44,12 +45,14 @@ pub(super) struct Limits<'a> {
     pub(super) view: &'a View<'a>,
     /// Whether a triangle across an occlusion edge is refused; else it is only flagged.
     pub(super) refuses_edges: bool,
+    /// Whether depth is that of natural neighbours and not of the triangle.
+    pub(super) natural: bool,
 }
 
 /// A corner of the triangulation, and which point it is.
-struct Corner {
-    at: Point2<f64>,
-    point: u32,
+pub(super) struct Corner {
+    pub(super) at: Point2<f64>,
+    pub(super) point: u32,
 }
 
 impl HasPosition for Corner {
@@ -68,8 +71,8 @@ pub(super) struct Surface<'a> {
 }
 
 /// Three points and the plane through them.
-struct Triangle {
-    corners: [Seen; 3],
+pub(super) struct Triangle {
+    pub(super) corners: [Seen; 3],
     slope: [f64; 2],
 }
 
@@ -113,18 +116,40 @@ impl<'a> Surface<'a> {
             _ => None,
         };
         let Some(face) = face else { return Local::Uncertain };
-        let (centre, radius_2) = face.circumcircle();
-        let radius = radius_2.sqrt() * (1.0 + 1e-9) + 1e-6;
-        let inside = |at: f64, low: f64, high: f64, first: f64, last: f64| {
+        let inside = |at: f64, radius: f64, low: f64, high: f64, first: f64, last: f64| {
             (at - radius > low || low <= first) && (at + radius < high || high >= last)
         };
-        let certain = radius.is_finite()
-            && inside(centre.x, window.low.u, window.high.u, whole.low.u, whole.high.u)
-            && inside(centre.y, window.low.v, window.high.v, whole.low.v, whole.high.v);
-        if !certain {
+        let free = |[u, v]: [f64; 2], radius: f64| {
+            let radius = radius * (1.0 + 1e-9) + 1e-6;
+            radius.is_finite()
+                && inside(u, radius, window.low.u, window.high.u, whole.low.u, whole.high.u)
+                && inside(v, radius, window.low.v, window.high.v, whole.low.v, whole.high.v)
+        };
+        let (centre, radius_2) = face.circumcircle();
+        if !free([centre.x, centre.y], radius_2.sqrt()) {
             return Local::Uncertain;
         }
-        Local::Certain(self.triangle(face.vertices().map(|v| v.data().point)).depth(&self.limits, pixel))
+        let triangle = self.triangle(face.vertices().map(|v| v.data().point));
+        let fit = triangle.fit(&self.limits);
+        let mut natural = self.limits.natural.then(|| Natural::new(&self.triangles, &self.points));
+        if fit.is_ok() && natural.as_mut().is_some_and(|n| !n.is_closed(pixel, free)) {
+            return Local::Uncertain;
+        }
+        Local::Certain(fit.map(|on_edge| self.sample(natural.as_mut(), &triangle, pixel, on_edge)))
+    }
+
+    /// Depth of a pixel in a triangle that is fit to interpolate in.
+    fn sample(
+        &self,
+        natural: Option<&mut Natural<'_>>,
+        triangle: &Triangle,
+        px: Pixel,
+        on_edge: bool,
+    ) -> DepthSample {
+        match natural.and_then(|n| n.z_m(px, triangle, &self.limits)) {
+            Some(z_m) => DepthSample { z_m, on_edge },
+            None => triangle.at(px, on_edge),
+        }
     }
 
     /// Depths of many pixels: each triangle fills those that it covers.
@@ -145,6 +170,7 @@ impl<'a> Surface<'a> {
     /// Pixels that some faces cover, with their depths.
     fn hits(&self, queries: &Queries, faces: &[FixedFaceHandle<InnerTag>]) -> Vec<(usize, Answer)> {
         let mut hits = Vec::new();
+        let mut natural = self.limits.natural.then(|| Natural::new(&self.triangles, &self.points));
         // Corners are all over memory: fetched in a loop of their own, they do not wait for each other.
         let corners = |face: &FixedFaceHandle<InnerTag>| {
             self.triangles
@@ -161,7 +187,7 @@ impl<'a> Surface<'a> {
                     let fit = triangle.fit(&self.limits);
                     (triangle, fit)
                 });
-                hits.push((i, fit.map(|on_edge| triangle.at(px, on_edge))));
+                hits.push((i, fit.map(|on_edge| self.sample(natural.as_mut(), triangle, px, on_edge))));
             });
         }
         hits
@@ -194,11 +220,6 @@ impl Triangle {
         let (cu, cv, cz) = (c.u - a.u, c.v - a.v, c.z_m - a.z_m);
         let area = bu * cv - bv * cu;
         Self { corners, slope: [(bz * cv - cz * bv) / area, (bu * cz - cu * bz) / area] }
-    }
-
-    /// Depth of a pixel, or why there is none.
-    fn depth(&self, limits: &Limits<'_>, at: Pixel) -> Answer {
-        self.fit(limits).map(|on_edge| self.at(at, on_edge))
     }
 
     /// Depth on the plane through the corners.
@@ -241,6 +262,13 @@ impl Triangle {
         }
         Ok(jumps && step(FLAG_SHARE))
     }
+}
+
+/// Whether a point lies on another surface than a triangle's corners.
+pub(super) fn off_surface(seen: &Seen, triangle: &Triangle, limits: &Limits<'_>) -> bool {
+    let side = |s: &Seen| (in_camera(s), limits.view.patch(s.leaf));
+    let own = side(seen);
+    triangle.corners.iter().map(side).any(|corner| apart(&own, &corner, 1.0) || apart(&corner, &own, 1.0))
 }
 
 /// Whether a point lies off the patch of another by more than this share of what sampling and noise explain.

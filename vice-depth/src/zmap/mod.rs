@@ -7,6 +7,7 @@
 
 mod buffer;
 mod interpolate;
+mod natural;
 mod occlude;
 mod queries;
 mod select;
@@ -56,11 +57,24 @@ pub struct ZMapOptions {
     /// Widest triangle that is trusted: its longest edge over the focal length, by default 0.1, which is 46 pixels
     /// at a focal length of 460.
     pub max_triangle: f64,
+    /// How depth is found between the points.
+    pub interpolation: Interpolation,
+}
+
+/// How depth is found between the points of a cloud.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Interpolation {
+    /// On the plane through the corners of the triangle around the pixel.
+    #[default]
+    Linear,
+    /// By the natural neighbours of the pixel (Sibson): no creases along the triangles' edges. Where a neighbour lies on
+    /// another surface than the triangle, linearly.
+    Natural,
 }
 
 impl Default for ZMapOptions {
     fn default() -> Self {
-        Self { occlusion: true, max_triangle: 0.1 }
+        Self { occlusion: true, max_triangle: 0.1, interpolation: Interpolation::Linear }
     }
 }
 
@@ -102,13 +116,18 @@ impl ZMapDepth {
     }
 
     fn points(&self, view: &View<'_>, window: &Window) -> Vec<Seen> {
-        if self.options.occlusion { Occlusion::new(view).visible(window) } else { view.all_seen(window) }
+        if self.options.occlusion {
+            Occlusion::new(view, self.options.max_triangle).visible(window)
+        } else {
+            view.all_seen(window)
+        }
     }
 
     fn limits<'a>(&self, view: &'a View<'a>) -> Limits<'a> {
         let [fx, ..] = view.camera().fx_fy_cx_cy();
         let refuses_edges = self.options.occlusion;
-        Limits { width_px: self.options.max_triangle * fx, view, refuses_edges }
+        let natural = self.options.interpolation == Interpolation::Natural;
+        Limits { width_px: self.options.max_triangle * fx, view, refuses_edges, natural }
     }
 
     /// The answer of a pixel's neighbourhood, or `None` where it takes the whole image.

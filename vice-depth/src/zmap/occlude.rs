@@ -5,6 +5,9 @@
 //! nearest at its pixel, where the point's own ray meets that patch: a floor seen at a grazing angle does not hide
 //! itself, though its depth changes much from one pixel to the next.
 //!
+//! A surface so near that its points lie further apart than the widest triangle that is trusted answers no pixel, and
+//! takes none from what is behind it: a few stray points before the lens would black out a tenth of the image.
+//!
 //! What a point's fate depends on lies within the largest disc's radius of it, so that a part of the image can be
 //! answered without the rest.
 
@@ -58,11 +61,13 @@ pub(super) struct Occlusion<'a> {
     view: &'a View<'a>,
     cell_px: f64,
     focal_px: f64,
+    /// Distance between points over their depth, beyond which they are no surface.
+    sparsest: f64,
 }
 
 impl<'a> Occlusion<'a> {
-    pub(super) fn new(view: &'a View<'a>) -> Self {
-        Self { view, cell_px: cell_px(view.camera()), focal_px: focal_px(view.camera()) }
+    pub(super) fn new(view: &'a View<'a>, sparsest: f64) -> Self {
+        Self { view, cell_px: cell_px(view.camera()), focal_px: focal_px(view.camera()), sparsest }
     }
 
     /// Points of a window that nothing hides, at most one in each quarter of a cell. The window has whole cells,
@@ -85,8 +90,11 @@ impl<'a> Occlusion<'a> {
         let parts: Vec<Thinned> = if keep {
             kept.par_iter().map(|seen| thinned(&mut seen.iter().copied())).collect()
         } else {
-            let seen =
-                |leaves: &[Leaf]| thinned(&mut leaves.iter().flat_map(|l| self.view.seen(*l, *window)));
+            let of_leaf = |leaf: &Leaf| {
+                let nearest_m = self.nearest_m(leaf);
+                self.view.seen(*leaf, *window).filter(move |seen| seen.z_m > nearest_m)
+            };
+            let seen = |leaves: &[Leaf]| thinned(&mut leaves.iter().flat_map(of_leaf));
             leaves.par_chunks(chunk).map(seen).collect()
         };
         parts.into_iter().reduce(Thinned::merged).map(Thinned::into_points).unwrap_or_default()
@@ -97,7 +105,8 @@ impl<'a> Occlusion<'a> {
         let (mut buffer, mut kept) = (Buffer::new(around, self.cell_px), Vec::new());
         for leaf in leaves {
             let spacing_m = self.view.patch(leaf.index).spacing_m;
-            for seen in self.view.seen(*leaf, *around) {
+            let nearest_m = self.nearest_m(leaf);
+            for seen in self.view.seen(*leaf, *around).filter(|seen| seen.z_m > nearest_m) {
                 buffer.draw([seen.u, seen.v], self.radius_px(spacing_m, seen.z_m), seen.z_m, seen.leaf);
                 if keep && window.contains(Pixel::new(seen.u, seen.v)) {
                     kept.push(seen);
@@ -105,6 +114,11 @@ impl<'a> Occlusion<'a> {
             }
         }
         (buffer, kept)
+    }
+
+    /// Depth that points of a leaf must be beyond to be dense enough for a surface.
+    fn nearest_m(&self, leaf: &Leaf) -> f64 {
+        self.view.patch(leaf.index).spacing_m / self.sparsest
     }
 
     /// Radius of a disc of a patch at a depth.

@@ -85,6 +85,59 @@ fn a_sparse_surface_hides_a_dense_one() {
 }
 
 #[test]
+fn stray_points_before_the_lens_hide_nothing() {
+    // A wall at 2 m with a point every centimetre, and a dozen strays at 16 cm, 3 cm apart.
+    let mut random = Random(9);
+    let wall: Vec<Point3<f32>> = (0..160_000)
+        .map(|_| Point3::new(random.next() * 4.0 - 2.0, random.next() * 4.0 - 2.0, 2.0).cast())
+        .collect();
+    let strays = (0..12).map(|i| Point3::new((i % 4) as f32 * 0.03, (i / 4) as f32 * 0.03, 0.16));
+    let camera = camera();
+    let mut keyframe = look(&camera, [0.0; 3], [0.0, 0.0, 1.0]);
+    keyframe.world_from_camera = Some(Rigid::identity());
+    let pixels = grid(&camera, 3);
+    let answered = |points: Vec<Point3<f32>>| {
+        let depths = zmap(points, with(true)).depths(&keyframe, &pixels).unwrap();
+        depths.iter().flatten().filter(|d| (d.z_m - 2.0).abs() < 1e-6).count()
+    };
+    let without = answered(wall.clone());
+    let among = answered(wall.into_iter().chain(strays).collect());
+    assert!(without * 10 > pixels.len() * 8 && among * 1000 > without * 995, "{among} of {without}");
+}
+
+#[test]
+fn natural_neighbours_reproduce_a_plane_and_stay_on_one_surface() {
+    // A slanted plane in pixels; and a screen before a wall, whose edge the triangles refuse.
+    let mut random = Random(6);
+    let natural = |occlusion| ZMapOptions { interpolation: Interpolation::Natural, ..with(occlusion) };
+    let camera =
+        Camera::new(640, 480, [500.0, 500.0, 320.0, 240.0], vice_core::camera::Model::Pinhole).unwrap();
+    let mut keyframe = look(&camera, [0.0; 3], [0.0, 0.0, 1.0]);
+    keyframe.world_from_camera = Some(Rigid::identity());
+    let z_of = |u: f64, v: f64| 2.0 + 1e-3 * (u - 320.0) - 5e-4 * (v - 240.0);
+    let points: Vec<Point3<f32>> = (0..20_000)
+        .map(|_| (random.next() * 640.0, random.next() * 480.0))
+        .map(|(u, v)| Point3::new((u - 320.0) / 500.0, (v - 240.0) / 500.0, 1.0) * z_of(u, v))
+        .map(|p| p.cast())
+        .collect();
+    let pixels = grid(&camera, 11);
+    for (px, depth) in pixels.iter().zip(zmap(points, natural(false)).depths(&keyframe, &pixels).unwrap()) {
+        if let Ok(depth) = depth {
+            assert!((depth.z_m - z_of(px.u, px.v)).abs() < 2e-6, "{px:?}: {depth:?}");
+        }
+    }
+    let scene = Scene::room();
+    let scan = scene.scan(10_000.0);
+    let (linear, by_triangle) = shares(&zmap(scan.iter().copied(), with(true)), &scene);
+    let (answered, good) = shares(&zmap(scan, natural(true)), &scene);
+    assert_eq!(answered, linear);
+    assert!(
+        good > by_triangle - 0.001,
+        "{good} of the natural ones within 2 cm, {by_triangle} of the linear ones"
+    );
+}
+
+#[test]
 fn a_plane_is_reproduced_and_a_miss_says_why() {
     // A wall at z = 2 with a hole, in a square that leaves the image's corners out.
     let mut random = Random(5);
@@ -189,6 +242,7 @@ proptest! {
         to in prop::array::uniform3(0.0..1.0_f64),
         per_m2 in 100.0..3000.0_f64,
         occlusion in any::<bool>(),
+        natural in any::<bool>(),
         seed in any::<u64>(),
     ) {
         let scene = Scene::room();
@@ -198,13 +252,26 @@ proptest! {
         prop_assume!((from[0] - to[0]).hypot(from[1] - to[1]) > 0.1);
         let camera = camera();
         let keyframe = look(&camera, from, to);
-        let zmap = zmap(scene.scan(per_m2), with(occlusion));
+        let interpolation = if natural { Interpolation::Natural } else { Interpolation::Linear };
+        let zmap = zmap(scene.scan(per_m2), ZMapOptions { interpolation, ..with(occlusion) });
         let mut random = Random(seed);
         let pixels: Vec<Pixel> =
             (0..4 * MOST_WINDOWS).map(|_| Pixel::new(random.next() * 751.0, random.next() * 479.0)).collect();
         let whole = zmap.depths(&keyframe, &pixels).unwrap();
         for some in pixels.chunks(MOST_WINDOWS).zip(whole.chunks(MOST_WINDOWS)) {
-            prop_assert_eq!(zmap.depths(&keyframe, some.0).unwrap(), some.1);
+            let near = zmap.depths(&keyframe, some.0).unwrap();
+            if !natural {
+                prop_assert_eq!(near, some.1);
+                continue;
+            }
+            // Shares of natural neighbours round by where their sum begins.
+            for (near, far) in near.iter().zip(some.1) {
+                let same = match (near, far) {
+                    (Ok(a), Ok(b)) => a.on_edge == b.on_edge && (a.z_m - b.z_m).abs() < 1e-9 * b.z_m,
+                    (a, b) => a == b,
+                };
+                prop_assert!(same, "{near:?} {far:?}");
+            }
         }
     }
 }
