@@ -20,7 +20,8 @@ const HARDLY_LESS: f64 = 0.9;
 const USUAL_TIMES: f64 = 4.5;
 /// A second flaw must add this, as a logarithm.
 const SECOND: f64 = 20.0;
-/// ... and bring what is left to less than this.
+/// ... and bring what is left to less than this, or add this: what is left is mostly the walk of the odometry.
+const SURE_SECOND: f64 = 35.0;
 const NEARER_WITH_SECOND: f64 = 0.97;
 /// No flaw is said where it has this share of the hypotheses.
 const NONE: f64 = 0.3;
@@ -131,7 +132,7 @@ pub(super) fn decide(
 
 /// The flaws that are named: the best hypothesis, or without a second flaw that adds little to it. A small gain may ride on
 /// an outlier that nobody found, so that it makes no name; it is no doubt of the first one either. A second flaw that may
-/// be zero, or that brings the key points no nearer to their labels, is none.
+/// be zero, or that adds little and brings the key points no nearer to their labels, is none.
 fn core(search: &Search) -> Option<Vec<Flaw>> {
     let best = &search.ranked[0].fit;
     let mut core = best;
@@ -139,9 +140,9 @@ fn core(search: &Search) -> Option<Vec<Flaw>> {
         let single = |flaw: Flaw| search.ranked.iter().map(|r| &r.fit).find(|f| f.flaws == [flaw]);
         let shown: Vec<Flaw> = best.flaws.iter().copied().filter(|f| shows(best, *f)).collect();
         let first = shown.iter().filter_map(|f| single(*f)).max_by(|a, b| a.score.total_cmp(&b.score))?;
-        let is_second = shown.len() == 2
-            && best.score - first.score >= SECOND
-            && usual_rms(best) < NEARER_WITH_SECOND * usual_rms(first);
+        let gain = best.score - first.score;
+        let nearer = || usual_rms(best) < NEARER_WITH_SECOND * usual_rms(first);
+        let is_second = shown.len() == 2 && (gain >= SURE_SECOND || (gain >= SECOND && nearer()));
         if !is_second {
             core = first;
         }
