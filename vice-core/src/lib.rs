@@ -9,6 +9,8 @@
 //! The core reads no files and decodes nothing: adapters do.
 #![forbid(unsafe_code)]
 
+pub use nalgebra;
+
 pub mod camera;
 pub mod conventions;
 pub mod dataset;
@@ -23,10 +25,11 @@ pub mod label;
 pub mod lanes;
 pub mod metrics;
 pub mod paired;
-mod random;
+pub mod random;
 pub mod registry;
 pub mod result;
 pub mod skip;
+pub mod statistics;
 pub mod suspicion;
 pub mod time;
 pub mod time_unit;

@@ -7,6 +7,7 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::frames::{Body, FrameError, Rigid, World, WorldFromBody};
+use crate::statistics::middle;
 use crate::time::{Span, Stamp};
 
 /// One row as a file has it: not checked yet.
@@ -238,8 +239,7 @@ impl Trajectory {
     /// The time between two poses, half of them closer; `None` for a single pose.
     pub fn median_spacing(&self) -> Option<Span> {
         let mut spans: Vec<Span> = self.stamps.windows(2).map(|w| w[1].since(w[0])).collect();
-        let middle = spans.len() / 2;
-        (!spans.is_empty()).then(|| *spans.select_nth_unstable(middle).1)
+        middle(&mut spans, Ord::cmp)
     }
 
     /// The pose at `stamp`: linear in position, slerp in rotation, between neighbours at most `max_gap` apart.
@@ -307,9 +307,7 @@ impl Trajectory {
 
     /// Median time between two poses; zero for a single pose.
     pub fn median_period(&self) -> Span {
-        let mut periods: Vec<Span> = self.stamps.windows(2).map(|w| w[1].since(w[0])).collect();
-        periods.sort_unstable();
-        periods.get(periods.len() / 2).copied().unwrap_or(Span::ZERO)
+        self.median_spacing().unwrap_or(Span::ZERO)
     }
 }
 

@@ -50,7 +50,7 @@ pub(super) fn hypotheses(
     scene: &Scene<'_>,
     trajectory: &Trajectory,
 ) -> Result<Vec<Hypothesis>, DiagnoseError> {
-    let at = |stamp: Stamp| evaluation.dataset.body_from_camera(evaluation.camera_name, stamp).ok();
+    let at = |stamp: Stamp| evaluation.rig.body_from_camera(stamp).ok();
     let given = Given { body_from_camera: Some(&at), first_frame: Some(scene.first_frame) };
     let mut lists: Vec<Vec<Convention>> = vec![vec![]];
     lists.extend(Convention::TRIED.iter().map(|c| vec![*c]));

@@ -119,7 +119,7 @@ impl<'a> Scene<'a> {
                 }
             }
             if labels.len() > from {
-                frames[frame].floor = evaluation.dataset.floor(frames[frame].stamp).ok();
+                frames[frame].floor = evaluation.rig.floor(frames[frame].stamp).ok();
                 let point = names.len() - 1;
                 segments.push(Segment { point, frame, px: keyframe.keyframe.px, labels: from..labels.len() });
             }

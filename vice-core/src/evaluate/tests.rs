@@ -6,12 +6,14 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::camera::{Model, Pixel};
-use crate::dataset::{Floor, Image};
-use crate::depth::{DepthMiss, DepthSample, Keyframe};
+use crate::camera::{Camera, Model, Pixel};
+use crate::dataset::{Dataset, Floor, Image};
+use crate::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
 use crate::frames::{Body, Rigid, World, WorldFromBody};
 use crate::label::{LabelRow, LabelSet, Observation, ObservationSource};
+use crate::metrics::align::Alignment;
 use crate::result::Role;
+use crate::time::Span;
 use crate::trajectory::{Trajectory, in_other_world};
 
 mod verdict;
@@ -141,22 +143,13 @@ fn run_with<T>(
 ) -> Result<T, EvaluateError> {
     let flyer = flyer();
     let selection = Selection::new(labels, &flyer.frames, &flyer.camera, &window)?;
-    work(Evaluation {
-        dataset: &flyer,
-        camera_name: "cam0",
-        camera: &flyer.camera,
-        frames: &flyer.frames,
-        selection: &selection,
-        streams,
-        anchor: 0,
-        own_anchors: false,
-        depths: &[&FloorOfTest],
-        checks: &[],
-        max_gap: Span::from_millis(100),
-        subsets: None,
-        align: Alignment::Se3,
-        keep_samples: true,
-    })
+    let rig = DatasetRig::new(&flyer, "cam0");
+    let evaluation = Evaluation::builder(&rig, &flyer.camera, &flyer.frames, &selection)
+        .streams(streams)
+        .depths(&[&FloorOfTest])
+        .keep_samples(true)
+        .build();
+    work(evaluation)
 }
 
 #[test]

@@ -73,7 +73,7 @@ fn subsets_of_size(points: &[SquaredErrors], size: usize) -> Option<SubsetRmse> 
     let mut sums = Moments::default();
     let sampled = total > MAX_SUBSETS;
     if sampled {
-        let mut random = SplitMix(size as u64);
+        let mut random = SplitMix::new(size as u64);
         let mut order: Vec<usize> = (0..points.len()).collect();
         for _ in 0..SAMPLED_SUBSETS {
             // The first `size` places of a partial Fisher-Yates shuffle are a uniform subset.
