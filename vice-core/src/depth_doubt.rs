@@ -7,8 +7,8 @@
 //! depths of the other points do. Where nearly all points ask for the same factor it is not theirs: the motion has another
 //! scale, or the camera another height.
 
+use crate::parallel::*;
 use nalgebra::{Point3, Vector3};
-use rayon::prelude::*;
 
 use crate::camera::{Camera, Pixel};
 use crate::frames::{self, Rigid};

@@ -8,14 +8,13 @@ mod builder;
 
 pub use builder::LabelSetBuilder;
 
-use serde::{Deserialize, Serialize};
-
 use crate::camera::Pixel;
 use crate::time::Stamp;
 
 /// Who made an observation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum ObservationSource {
     /// A human placed it.

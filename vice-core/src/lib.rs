@@ -16,6 +16,7 @@ pub mod conventions;
 pub mod dataset;
 pub mod depth;
 pub mod depth_doubt;
+#[cfg(feature = "serde")]
 pub mod diagnose;
 pub mod error;
 pub mod evaluate;
@@ -25,6 +26,7 @@ pub mod label;
 pub mod lanes;
 pub mod metrics;
 pub mod paired;
+mod parallel;
 pub mod random;
 pub mod registry;
 pub mod result;

@@ -6,8 +6,6 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
-
 use crate::result::{PixelPart, PointName, Sample};
 use crate::statistics::{WithInterval, bootstrap};
 use crate::time::Stamp;
@@ -18,7 +16,8 @@ pub const RESAMPLES: usize = 2000;
 const SAME_LABEL_PX: f64 = 0.01;
 
 /// What two results say at the labels that both scored. Differences are B minus A: negative where B is better.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Paired {
     /// Labels that both scored.
     pub labels: u64,

@@ -24,7 +24,6 @@ mod rational;
 mod solve;
 
 use nalgebra::{Point3, Vector3};
-use serde::{Deserialize, Serialize};
 
 use crate::lanes::Number;
 
@@ -37,8 +36,9 @@ pub use rational::Rational;
 pub const UNPROJECT_TOLERANCE: f64 = 1e-10;
 
 /// A place in the image, in pixels; pixel centres are integers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(from = "[f64; 2]", into = "[f64; 2]")]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(from = "[f64; 2]", into = "[f64; 2]"))]
 pub struct Pixel {
     /// To the right.
     pub u: f64,

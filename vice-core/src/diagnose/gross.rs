@@ -1,6 +1,6 @@
 //! Gross errors first: another convention of the whole stream, before any small flaw is fitted.
 
-use rayon::prelude::*;
+use crate::parallel::*;
 
 use super::DiagnoseError;
 use super::motion::{Motion, Poses};

@@ -6,8 +6,8 @@
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use crate::parallel::*;
 use nalgebra::Vector2;
-use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::flaw::{Flaw, PARAMETERS};

@@ -1,6 +1,6 @@
 //! All hypotheses: none, each flaw, pairs; fitted to the same labels with the same outliers, by their evidence.
 
-use rayon::prelude::*;
+use crate::parallel::*;
 
 use super::DiagnoseError;
 use super::filter::Weights;

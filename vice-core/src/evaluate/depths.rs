@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
+use crate::parallel::*;
 
 use super::streams::PosesAtFrames;
 use super::{EvaluateError, Evaluation, position};

@@ -21,6 +21,7 @@ mod since;
 mod sparse;
 mod spread;
 mod streams;
+#[cfg(feature = "serde")]
 pub(crate) mod trial;
 
 pub use input::{DEFAULT_MAX_GAP, Evaluation, EvaluationBuilder};

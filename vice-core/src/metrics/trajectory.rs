@@ -2,15 +2,14 @@
 //!
 //! Everything here takes the pairs as they are: align the estimate first ([`crate::metrics::align`]).
 
-use serde::{Deserialize, Serialize};
-
 use crate::error::{DataError, DataResult};
 use crate::frames::{WorldFromBody, rotation_angle_rad};
 use crate::metrics::associate::PosePairs;
 use crate::statistics::median;
 
 /// What a list of errors amounts to, in the unit of the errors (`sse` in its square).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Statistics {
     /// Root of the mean square.
     pub rmse: f64,
@@ -69,7 +68,8 @@ pub struct ApeErrors {
 }
 
 /// Statistics of the absolute pose error.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Ape {
     /// Of the distances, metres.
     pub translation_m: Statistics,
@@ -115,7 +115,8 @@ impl ApeErrors {
 }
 
 /// The paper's three numbers of an estimate against a reference.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Summary {
     /// RMSE_3D: root mean square of the position difference, metres.
     pub rmse_3d_m: f64,
