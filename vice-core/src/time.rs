@@ -9,6 +9,17 @@ use std::ops::{Add, Neg, Sub};
 const NANOS_PER_SECOND: i64 = 1_000_000_000;
 
 /// A point in time: nanoseconds since the epoch of the data set's clock.
+///
+/// ```
+/// use vice_core::time::{Span, Stamp};
+///
+/// // Read digit by digit: a double would be off by more than 100 ns here.
+/// let stamp = Stamp::parse_seconds("1403715273.262142976")?;
+/// assert_eq!(stamp.as_nanos(), 1_403_715_273_262_142_976);
+/// let later = stamp + Span::from_millis(50);
+/// assert_eq!(later.since(stamp), Span::from_nanos(50_000_000));
+/// # Ok::<(), vice_core::time::TimeError>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(transparent))]
