@@ -6,7 +6,12 @@
 //! and compared in pixels with their labels ([`metrics`]). [`mod@evaluate`] is the list of these stages, and a
 //! [`result::Evaluated`] is what leaves; [`mod@diagnose`] names the flaw behind the pixels. Formats are found by name or by looking in a [`registry::Registry`].
 //!
-//! The core reads no files and decodes nothing: adapters do.
+//! The core reads no files and decodes nothing: adapters do. Who has arrays needs no data set: an
+//! [`Evaluation`](evaluate::Evaluation) is built from a camera, stamps, labels, poses and a depth source, as
+//! `examples/rmse_2d.rs` shows from first to last.
+//!
+//! The features `rayon` (several threads, the same results) and `serde` (results can be written and read; [`mod@diagnose`]
+//! needs it) are on by default. nalgebra, whose types stand in many signatures, is re-exported.
 #![forbid(unsafe_code)]
 
 pub use nalgebra;
