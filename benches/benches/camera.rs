@@ -11,11 +11,12 @@ use criterion::{
 };
 use nalgebra::Point3;
 use rayon::ThreadPool;
-use vice_benches::{Numbers, keyframe, small_motion};
+use vice_benches::{keyframe, small_motion};
 use vice_core::camera::{Camera, Model, Pixel};
 use vice_core::depth::DepthSource;
 use vice_core::frames::{Rigid, WorldFromCamera};
 use vice_core::lanes::Element;
+use vice_core::random::Congruential;
 use vice_core::track::track_batch;
 use vice_depth::FloorDepth;
 
@@ -65,7 +66,7 @@ struct Data<T> {
 
 impl<T: Element> Data<T> {
     fn new(n: usize, ranges: [[f64; 2]; 3]) -> Self {
-        let mut numbers = Numbers::new(7);
+        let mut numbers = Congruential::new(7);
         let input =
             ranges.map(|[low, high]| numbers.list(n, low, high).into_iter().map(T::from_f64).collect());
         Self { input, output: [(); 2].map(|()| vec![T::default(); n]), valid: vec![false; n] }
@@ -186,9 +187,9 @@ fn floor(c: &mut Criterion) {
     let mut group = c.benchmark_group(format!("floor/{name}"));
     for n in sizes().into_iter().filter(|n| *n <= 1_000_000) {
         quick(&mut group, n);
-        let mut numbers = Numbers::new(7);
+        let mut numbers = Congruential::new(7);
         let pixels: Vec<Pixel> =
-            (0..n).map(|_| Pixel::new(numbers.between(0.0, 751.0), numbers.between(0.0, 479.0))).collect();
+            (0..n).map(|_| Pixel::new(numbers.uniform(0.0, 751.0), numbers.uniform(0.0, 479.0))).collect();
         group.bench_function(BenchmarkId::from_parameter(n), |b| {
             b.iter(|| FloorDepth::new().depths(&keyframe, &pixels).unwrap());
         });

@@ -10,6 +10,7 @@ use vice_core::camera::{Camera, CameraError, Model};
 use vice_core::dataset::{Floor, Plane};
 use vice_core::depth::Keyframe;
 use vice_core::frames::{BodyFromCamera, WorldFromCamera};
+use vice_core::random::Congruential;
 use vice_core::time::Stamp;
 
 /// A file of the shared data (`VICE_SHARED`, by default `../shared`), if it is there.
@@ -55,8 +56,8 @@ pub fn scan_points(points: usize) -> impl Iterator<Item = Point3<f32>> {
             }
         }
     }
-    let mut numbers = Numbers::new(42);
-    let mut next = move || numbers.between(0.0, 1.0);
+    let mut numbers = Congruential::new(42);
+    let mut next = move || numbers.uniform(0.0, 1.0);
     (0..points).map(move |_| {
         let at = next() * area_m2;
         let (_, axis, side, low, high) = faces[faces.partition_point(|f| f.0 <= at).min(faces.len() - 1)];
@@ -88,9 +89,9 @@ pub fn in_one_thread<R: Send>(work: impl FnOnce() -> R + Send) -> Result<R, rayo
 
 /// Points in the view of a camera at the origin that looks along z: two walls, one 4 m and one 9 m away, metres.
 pub fn before_the_camera(points: usize) -> impl Iterator<Item = Point3<f32>> {
-    let mut numbers = Numbers::new(42);
+    let mut numbers = Congruential::new(42);
     (0..points).map(move |_| {
-        let [a, b] = [numbers.between(-0.8, 0.8), numbers.between(-0.5, 0.5)];
+        let [a, b] = [numbers.uniform(-0.8, 0.8), numbers.uniform(-0.5, 0.5)];
         let z = if a < 0.0 { 4.0 + b } else { 9.0 - a };
         Point3::new(a * z, b * z, z).cast()
     })
@@ -102,11 +103,11 @@ pub fn before_the_camera(points: usize) -> impl Iterator<Item = Point3<f32>> {
 /// If the file cannot be written.
 pub fn write_tum(path: &Path, poses: usize, noise_m: f64) -> std::io::Result<()> {
     let mut file = BufWriter::new(File::create(path)?);
-    let mut numbers = Numbers::new(7);
+    let mut numbers = Congruential::new(7);
     for i in 0..poses {
         let ns = 1_600_000_000_000_000_000 + 5_000_000 * i as u64;
         let t = i as f64 / 200.0;
-        let [x, y, z] = [t.cos(), (2.0 * t).sin(), 0.3 * t].map(|v| v + numbers.between(-noise_m, noise_m));
+        let [x, y, z] = [t.cos(), (2.0 * t).sin(), 0.3 * t].map(|v| v + numbers.uniform(-noise_m, noise_m));
         let half = 0.5 * (0.2 * t).sin();
         let (seconds, nanos) = (ns / 1_000_000_000, ns % 1_000_000_000);
         writeln!(file, "{seconds}.{nanos:09} {x:.9} {y:.9} {z:.9} 0 0 {:.9} {:.9}", half.sin(), half.cos())?;
@@ -129,32 +130,10 @@ pub fn small_motion() -> WorldFromCamera {
     WorldFromCamera::from_parts(Vector3::new(0.1, 0.0, -0.1), rotation)
 }
 
-/// Numbers that are the same on every run: a linear congruential generator (Knuth's MMIX constants).
-#[derive(Clone, Debug)]
-pub struct Numbers(u64);
-
-impl Numbers {
-    /// A generator.
-    pub const fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    /// Uniform in `[low, high)`.
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        low + (high - low) * (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// So many of them.
-    pub fn list(&mut self, n: usize, low: f64, high: f64) -> Vec<f64> {
-        (0..n).map(|_| self.between(low, high)).collect()
-    }
-}
-
 /// The best time of moving and projecting so many points with [`radtan`], seconds; infinity where that camera fails.
 pub fn project_moved_seconds(points: usize) -> f64 {
     let Ok(camera) = radtan() else { return f64::INFINITY };
-    let mut numbers = Numbers::new(7);
+    let mut numbers = Congruential::new(7);
     let [x, y, z] =
         [[-0.7, 0.7], [-0.42, 0.42], [1.0, 8.0]].map(|[low, high]| numbers.list(points, low, high));
     let (mut u, mut v, mut valid) = (vec![0.0; points], vec![0.0; points], vec![false; points]);

@@ -14,16 +14,15 @@ use vice_core::dataset::{Dataset, Floor, Image};
 use vice_core::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
 use vice_core::diagnose::{DiagnoseError, Diagnosed, Diagnosis, Flaw, InertialRun, Options, Theta, diagnose};
 use vice_core::error::{DataError, DataResult};
-use vice_core::evaluate::{Evaluation, Selection, Stream, Window};
+use vice_core::evaluate::{DatasetRig, Evaluation, Selection, Stream, Window};
 use vice_core::frames::{BodyFromCamera, Rigid, WorldFromCamera};
 use vice_core::imu::{GRAVITY_Z_UP_M_S2, ImuSample, InertialState};
 use vice_core::label::{LabelRow, LabelSet, Observation};
-use vice_core::metrics::align::Alignment;
+use vice_core::random::SplitMix;
 use vice_core::result::Role;
 use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
 use vice_synthetic::Flight;
-use vice_synthetic::rng::Rng;
 
 /// Noise of a label, pixels a coordinate.
 pub const LABEL_NOISE_PX: f64 = 0.5;
@@ -61,7 +60,7 @@ impl Flawed {
     /// # Panics
     /// If the flight is not what it should be.
     pub fn new(flaw: Option<Flaw>, seed: u64) -> Self {
-        let mut rng = Rng::new(seed, 71);
+        let mut rng = SplitMix::for_purpose(seed, 71);
         let mut truth = Theta::zero();
         let sign = if rng.uniform(0.0, 1.0) < 0.5 { -1.0 } else { 1.0 };
         let direction = Vector3::from_fn(|_, _| rng.normal()).normalize();
@@ -109,14 +108,15 @@ impl Flawed {
         let body_from_camera = body_from_camera();
         let frames: Arc<[Stamp]> =
             (0..(seconds * FRAME_HZ) as i64).map(|i| stamp(i as f64 / FRAME_HZ)).collect();
-        let hand = Hand::new(!inertial, &mut Rng::new(seed, 74));
+        let hand = Hand::new(!inertial, &mut SplitMix::for_purpose(seed, 74));
         let reference = trajectory(seconds, |t| flight.at(t).world_from_body * hand.at(t));
         let room = Room { camera, body_from_camera, reference };
-        let labels = labels(&room, &frames, truth.of(Flaw::RollingShutter)[0], &mut Rng::new(seed, 72));
-        let inertial = inertial.then(|| run(&flight, seconds, &truth, &mut Rng::new(seed, 73)));
+        let labels =
+            labels(&room, &frames, truth.of(Flaw::RollingShutter)[0], &mut SplitMix::for_purpose(seed, 72));
+        let inertial = inertial.then(|| run(&flight, seconds, &truth, &mut SplitMix::for_purpose(seed, 73)));
         let estimate = match &inertial {
             Some(run) => run.integrate(Span::ZERO, Vector3::zeros()).expect("it can be integrated"),
-            None => odometry(&room.reference, &truth, &mut Rng::new(seed, 73)),
+            None => odometry(&room.reference, &truth, &mut SplitMix::for_purpose(seed, 73)),
         };
         // In use is what the truth makes of it when its errors are added: the correction of the negated errors.
         let wrong = truth.negated();
@@ -163,22 +163,11 @@ impl Flawed {
         }
         let depth_camera = DepthCamera(&self.room);
         let source: &dyn DepthSource = if with_reference { &self.room } else { &depth_camera };
-        let evaluation = Evaluation {
-            dataset: self,
-            camera_name: CAMERA,
-            camera: &self.camera,
-            frames: &self.frames,
-            selection: &selection,
-            streams: &streams,
-            anchor: 0,
-            own_anchors: false,
-            depths: &[source],
-            checks: &[],
-            max_gap: Span::from_millis(100),
-            subsets: None,
-            align: Alignment::Se3,
-            keep_samples: false,
-        };
+        let (rig, depths) = (DatasetRig::new(self, CAMERA), [source]);
+        let evaluation = Evaluation::builder(&rig, &self.camera, &self.frames, &selection)
+            .streams(&streams)
+            .depths(&depths)
+            .build();
         let diagnosis = Diagnosis {
             evaluation: &evaluation,
             stream: streams.len() - 1,
@@ -228,7 +217,7 @@ struct Hand([(f64, f64, f64); 3]);
 
 impl Hand {
     /// Amplitude (rad), frequency (rad/s) and phase by axis: up, right and forward.
-    fn new(moves: bool, rng: &mut Rng) -> Self {
+    fn new(moves: bool, rng: &mut SplitMix) -> Self {
         let size = f64::from(u8::from(moves));
         Self([(0.25, 1.9), (0.12, 2.3), (0.2, 1.5)].map(|(amplitude, frequency)| {
             (size * amplitude, frequency, rng.uniform(0.0, std::f64::consts::TAU))
@@ -242,7 +231,7 @@ impl Hand {
 }
 
 /// Points that are followed from a random pixel until they leave the image or for four seconds.
-fn labels(room: &Room, frames: &[Stamp], readout_s: f64, rng: &mut Rng) -> LabelSet {
+fn labels(room: &Room, frames: &[Stamp], readout_s: f64, rng: &mut SplitMix) -> LabelSet {
     let camera = &room.camera;
     // A row is exposed a share of the read-out time before or after the stamp.
     let at_row = |i: usize, px: Pixel| {
@@ -294,7 +283,7 @@ fn labels(room: &Room, frames: &[Stamp], readout_s: f64, rng: &mut Rng) -> Label
 }
 
 /// The truth with a drift, a scale, a late clock and the errors of a visual-inertial odometry.
-fn odometry(reference: &Trajectory, truth: &Theta, rng: &mut Rng) -> Trajectory {
+fn odometry(reference: &Trajectory, truth: &Theta, rng: &mut SplitMix) -> Trajectory {
     const POSITION_WALK_M: f64 = 0.004;
     const YAW_WALK_RAD: f64 = 0.05 * std::f64::consts::PI / 180.0;
     const SWAY_RAD: f64 = 0.05 * std::f64::consts::PI / 180.0;
@@ -305,7 +294,7 @@ fn odometry(reference: &Trajectory, truth: &Theta, rng: &mut Rng) -> Trajectory 
     let (velocity, yaw_rate) = (Vector3::new(drift[0], drift[1], drift[2]), drift[3]);
     let longer = 1.0 + truth.of(Flaw::Scale)[0];
     let late = Span::from_secs_f64(truth.of(Flaw::ClockOffset)[0]).expect("a span");
-    let vector = |rng: &mut Rng, sigma: f64| Vector3::from_fn(|_, _| sigma * rng.normal());
+    let vector = |rng: &mut SplitMix, sigma: f64| Vector3::from_fn(|_, _| sigma * rng.normal());
     let (mut position, mut yaw, mut sway) = (reference.poses()[0].translation(), 0.0, Vector3::zeros());
     let mut before = (reference.start(), reference.poses()[0].translation());
     let mut poses = Vec::with_capacity(reference.len());
@@ -336,7 +325,7 @@ fn odometry(reference: &Trajectory, truth: &Theta, rng: &mut Rng) -> Trajectory 
 }
 
 /// Samples with the white noise of a good MEMS sensor, and a start that is tilted.
-fn run(flight: &Flight, seconds: f64, truth: &Theta, rng: &mut Rng) -> InertialRun {
+fn run(flight: &Flight, seconds: f64, truth: &Theta, rng: &mut SplitMix) -> InertialRun {
     const GYRO_RAD_S: f64 = 1.7e-4;
     const ACCEL_M_S2: f64 = 2.0e-3;
     let mut white = |density: f64| Vector3::from_fn(|_, _| density * IMU_HZ.sqrt() * rng.normal());

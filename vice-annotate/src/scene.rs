@@ -112,25 +112,17 @@ impl SceneEstimates {
         let window = Window { observations: Observations::All, ..Window::default() };
         let selection = Selection::new(labels, &opened.frames, &opened.camera, &window)?;
         let streams = self.streams_for(&selection)?;
-        evaluate(
-            &Evaluation {
-                dataset: opened.dataset.as_ref(),
-                camera_name: &opened.camera_name,
-                camera: &opened.camera,
-                frames: &opened.frames,
-                selection: &selection,
-                streams: &streams.list,
-                anchor: streams.anchor,
-                own_anchors: streams.own_anchors,
-                depths: &[self.depth.as_ref()],
-                checks: &[],
-                max_gap: self.request.streams.max_gap,
-                subsets: None,
-                align: Alignment::None,
-                keep_samples: true,
-            },
-            &|_, _| {},
-        )
+        let (rig, depths) = (opened.rig(), [self.depth.as_ref()]);
+        let evaluation = Evaluation::builder(&rig, &opened.camera, &opened.frames, &selection)
+            .streams(&streams.list)
+            .anchor(streams.anchor)
+            .own_anchors(streams.own_anchors)
+            .depths(&depths)
+            .max_gap(self.request.streams.max_gap)
+            .align(Alignment::None)
+            .keep_samples(true)
+            .build();
+        evaluate(&evaluation, &|_, _| {})
     }
 
     fn ask(&self, source: &dyn DepthSource, frame: usize, pixels: &[Pixel]) -> DataResult<Vec<Option<f64>>> {

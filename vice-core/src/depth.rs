@@ -1,7 +1,5 @@
 //! Depth sources: how far along the optical axis the scene is at a pixel of a key frame.
 
-use serde::{Deserialize, Serialize};
-
 use crate::camera::{Camera, Pixel};
 use crate::dataset::{Dataset, Floor};
 use crate::error::DataResult;
@@ -66,10 +64,9 @@ impl DepthSample {
 }
 
 /// Why a pixel has no depth.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, thiserror::Error,
-)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, thiserror::Error)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum DepthMiss {
     /// The anchor has no pose at the key frame, and the source needs one.

@@ -7,12 +7,12 @@
 //! depths of the other points do. Where nearly all points ask for the same factor it is not theirs: the motion has another
 //! scale, or the camera another height.
 
+use crate::parallel::*;
 use nalgebra::{Point3, Vector3};
-use rayon::prelude::*;
 
 use crate::camera::{Camera, Pixel};
 use crate::frames::{self, Rigid};
-use crate::metrics::held::median;
+use crate::statistics::{median, quantile, sorted};
 
 /// Depths from a tenth to ten times the one that was used are tried.
 const FARTHEST: f64 = 10.0;
@@ -104,9 +104,8 @@ pub fn doubts(camera: &Camera, tracks: &[LiftedTrack]) -> Doubts {
         })
         .filter(|(_, f)| f.tells)
         .collect();
-    let mut off: Vec<f64> = fits.iter().map(|(_, f)| f.factor.ln().abs()).collect();
-    off.sort_by(f64::total_cmp);
-    let others = off.get((OTHERS_SHARE * off.len() as f64) as usize).copied().unwrap_or(0.0);
+    let off = sorted(fits.iter().map(|(_, f)| f.factor.ln().abs()).collect());
+    let others = quantile(&off, OTHERS_SHARE).unwrap_or(0.0);
     let clear = |f: &Fit| f.gain > GAIN && f.error_then_px < LEFT_SHARE * f.error_px;
     if let Some(common) = common(&fits, clear) {
         return Doubts { points: vec![], common: Some(common) };
@@ -120,14 +119,13 @@ pub fn doubts(camera: &Camera, tracks: &[LiftedTrack]) -> Doubts {
 
 /// The factor that nearly all points ask for.
 fn common(fits: &[(usize, Fit)], clear: impl Fn(&Fit) -> bool) -> Option<(f64, usize, usize)> {
-    let mut logs: Vec<f64> = fits.iter().filter(|(_, f)| clear(f)).map(|(_, f)| f.factor.ln()).collect();
+    let logs = sorted(fits.iter().filter(|(_, f)| clear(f)).map(|(_, f)| f.factor.ln()).collect());
     let n = logs.len();
     if n < FEWEST_FOR_ALL || (n as f64) < NEARLY_ALL * fits.len() as f64 {
         return None;
     }
-    logs.sort_by(f64::total_cmp);
-    let spread = logs[3 * n / 4] - logs[n / 4];
-    let middle = median(&mut logs)?;
+    let spread = quantile(&logs, 0.75)? - quantile(&logs, 0.25)?;
+    let middle = quantile(&logs, 0.5)?;
     (middle.abs() > LEAST_OFF_LOG && spread < COMMON_LOG).then(|| (middle.exp(), n, fits.len()))
 }
 
@@ -267,7 +265,7 @@ mod tests {
 
     #[test]
     fn wrong_depths_are_found_and_right_ones_left_alone() {
-        let mut random = SplitMix(7);
+        let mut random = SplitMix::new(7);
         for seed in 0..10 {
             let tracks: Vec<LiftedTrack> = (0..20)
                 .map(|i| track(&mut random, if i % 2 == 0 { 1.0 } else { 1.3 + 0.1 * f64::from(i) }, 1.0))
@@ -285,7 +283,7 @@ mod tests {
 
     #[test]
     fn a_scale_of_the_motion_is_not_blamed_on_the_points() {
-        let mut random = SplitMix(3);
+        let mut random = SplitMix::new(3);
         let tracks: Vec<LiftedTrack> = (0..12).map(|_| track(&mut random, 1.0, 1.5)).collect();
         let found = doubts(&camera(), &tracks);
         assert!(found.points.is_empty(), "{found:?}");
@@ -295,7 +293,7 @@ mod tests {
 
     #[test]
     fn nothing_is_doubted_where_nothing_can_be_seen() {
-        let mut random = SplitMix(5);
+        let mut random = SplitMix::new(5);
         let mut tracks: Vec<LiftedTrack> =
             (0..8).map(|i| track(&mut random, 1.0 + f64::from(i), 0.0)).collect();
         // The camera stands, and so do the labels.

@@ -31,6 +31,16 @@ pub enum ErrorKind {
 }
 
 /// Data that cannot be used. Shown as one line: `path:line: problem (hint)`, then its cause.
+///
+/// ```
+/// use vice_core::error::{DataError, ErrorKind};
+///
+/// let error = DataError::of_kind(ErrorKind::Corrupt, "the stamp is no number")
+///     .at("poses.txt")
+///     .line(7)
+///     .hint("seconds, such as 1403715273.26");
+/// assert_eq!(error.to_string(), "poses.txt:7: the stamp is no number (seconds, such as 1403715273.26)");
+/// ```
 #[derive(Debug)]
 pub struct DataError {
     kind: ErrorKind,

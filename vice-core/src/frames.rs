@@ -55,6 +55,19 @@ pub enum Cloud {}
 pub enum Sensor {}
 
 /// A rotation and translation (metres) that takes coordinates in `Src` to coordinates in `Dst`.
+///
+/// ```
+/// use vice_core::frames::{BodyFromCamera, Rigid, WorldFromBody, WorldFromCamera};
+/// use vice_core::nalgebra::{Point3, UnitQuaternion, Vector3};
+///
+/// // The body is 1 m up and turned a quarter to the left; the camera sits 0.1 m before its centre.
+/// let quarter = UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_2);
+/// let world_from_body: WorldFromBody = Rigid::from_parts(Vector3::new(0.0, 0.0, 1.0), quarter);
+/// let body_from_camera: BodyFromCamera = Rigid::from_parts(Vector3::new(0.1, 0.0, 0.0), UnitQuaternion::identity());
+/// let world_from_camera: WorldFromCamera = world_from_body * body_from_camera;
+/// let centre = world_from_camera.transform_point(&Point3::origin());
+/// assert!((centre - Point3::new(0.0, 0.1, 1.0)).norm() < 1e-12);
+/// ```
 pub struct Rigid<Dst, Src> {
     isometry: Isometry3<f64>,
     frames: PhantomData<fn(Src) -> Dst>,

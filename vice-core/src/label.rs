@@ -8,14 +8,13 @@ mod builder;
 
 pub use builder::LabelSetBuilder;
 
-use serde::{Deserialize, Serialize};
-
 use crate::camera::Pixel;
 use crate::time::Stamp;
 
 /// Who made an observation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum ObservationSource {
     /// A human placed it.
@@ -97,6 +96,25 @@ pub struct Segment<'a> {
 }
 
 /// All labels of one camera of one run.
+///
+/// ```
+/// use vice_core::camera::Pixel;
+/// use vice_core::label::{LabelRow, LabelSet, Observation};
+/// use vice_core::time::Stamp;
+///
+/// let row = |millis: i64, u_px: f64, keyframe: bool| LabelRow {
+///     point: "corner".to_string(),
+///     observation: Observation {
+///         keyframe,
+///         ..Observation::manual(Stamp::from_nanos(millis * 1_000_000), Pixel::new(u_px, 240.0))
+///     },
+/// };
+/// let labels = LabelSet::from_rows([row(0, 320.0, true), row(50, 322.5, false), row(100, 325.0, false)])?;
+/// // What follows a key frame is scored against it.
+/// let segment = labels.points()[0].segments().next().unwrap();
+/// assert_eq!((segment.keyframe.px.u, segment.rest.len()), (320.0, 2));
+/// # Ok::<(), vice_core::label::LabelError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LabelSet {
     points: Vec<PointLabels>,

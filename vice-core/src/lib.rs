@@ -6,14 +6,22 @@
 //! and compared in pixels with their labels ([`metrics`]). [`mod@evaluate`] is the list of these stages, and a
 //! [`result::Evaluated`] is what leaves; [`mod@diagnose`] names the flaw behind the pixels. Formats are found by name or by looking in a [`registry::Registry`].
 //!
-//! The core reads no files and decodes nothing: adapters do.
+//! The core reads no files and decodes nothing: adapters do. Who has arrays needs no data set: an
+//! [`Evaluation`](evaluate::Evaluation) is built from a camera, stamps, labels, poses and a depth source, as
+//! `examples/rmse_2d.rs` shows from first to last.
+//!
+//! The features `rayon` (several threads, the same results) and `serde` (results can be written and read; [`mod@diagnose`]
+//! needs it) are on by default. nalgebra, whose types stand in many signatures, is re-exported.
 #![forbid(unsafe_code)]
+
+pub use nalgebra;
 
 pub mod camera;
 pub mod conventions;
 pub mod dataset;
 pub mod depth;
 pub mod depth_doubt;
+#[cfg(feature = "serde")]
 pub mod diagnose;
 pub mod error;
 pub mod evaluate;
@@ -23,10 +31,12 @@ pub mod label;
 pub mod lanes;
 pub mod metrics;
 pub mod paired;
-mod random;
+mod parallel;
+pub mod random;
 pub mod registry;
 pub mod result;
 pub mod skip;
+pub mod statistics;
 pub mod suspicion;
 pub mod time;
 pub mod time_unit;

@@ -6,10 +6,8 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
-
-use crate::random::SplitMix;
 use crate::result::{PixelPart, PointName, Sample};
+use crate::statistics::{WithInterval, bootstrap};
 use crate::time::Stamp;
 
 /// Resamples of an interval.
@@ -17,17 +15,9 @@ pub const RESAMPLES: usize = 2000;
 /// Labels closer than this are the same, pixels.
 const SAME_LABEL_PX: f64 = 0.01;
 
-/// A number with the middle 95 % of its resampled values.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct WithInterval {
-    /// The number.
-    pub value: f64,
-    /// The interval; `None` where there is only one point with one segment to draw from.
-    pub interval_95: Option<[f64; 2]>,
-}
-
 /// What two results say at the labels that both scored. Differences are B minus A: negative where B is better.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Paired {
     /// Labels that both scored.
     pub labels: u64,
@@ -116,10 +106,8 @@ pub fn paired(a: &PixelPart, b: &PixelPart, seed: u64) -> Option<Paired> {
     let placed: Vec<(usize, usize, Cell)> =
         cells.iter().map(|((point, start), cell)| (points[point], segments[start], *cell)).collect();
     let resampled = resample(&placed, points.len(), segments.len(), seed);
-    let with_interval = |number: fn(&Cell) -> f64| WithInterval {
-        value: number(&all),
-        interval_95: middle(resampled.iter().map(number).collect()),
-    };
+    let with_interval =
+        |number: fn(&Cell) -> f64| WithInterval::of(number(&all), resampled.iter().map(number).collect());
     Some(Paired {
         labels,
         points: points.len(),
@@ -146,27 +134,15 @@ fn resample(cells: &[(usize, usize, Cell)], points: usize, segments: usize, seed
     if cells.len() < 2 {
         return vec![];
     }
-    let mut random = SplitMix(seed);
-    let mut sums = Vec::with_capacity(RESAMPLES);
-    for _ in 0..RESAMPLES {
+    bootstrap(RESAMPLES, seed, |random| {
         let (of_points, of_segments) = (random.resample(points), random.resample(segments));
         let mut sum = Cell::default();
         for (point, segment, cell) in cells {
             sum.add(cell, f64::from(of_points[*point]) * f64::from(of_segments[*segment]));
         }
         // Points and segments may be drawn that never meet.
-        if sum.count > 0.0 {
-            sums.push(sum);
-        }
-    }
-    sums
-}
-
-/// The middle 95 % of values.
-fn middle(mut values: Vec<f64>) -> Option<[f64; 2]> {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().checked_sub(1)? as f64;
-    Some([0.025, 0.975].map(|share| values[(share * last).round() as usize]))
+        (sum.count > 0.0).then_some(sum)
+    })
 }
 
 #[cfg(test)]

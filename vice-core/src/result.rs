@@ -11,8 +11,6 @@ pub use held::{AsideReason, Figure, HeldPart, SetAside, WindowPart};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
 use crate::camera::Pixel;
 use crate::metrics::pixel::SubsetRmse;
 use crate::skip::SkipReason;
@@ -20,7 +18,8 @@ use crate::suspicion::Suspicions;
 use crate::time::Stamp;
 
 /// What an evaluation found.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Evaluated {
     /// What was evaluated.
     pub dataset: DatasetPart,
@@ -29,15 +28,16 @@ pub struct Evaluated {
     /// Estimates against the reference, where there is one.
     pub trajectory: Vec<TrajectoryPart>,
     /// Where each stream went, for plots; empty where the samples were not asked for.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub paths: Vec<PathPart>,
     /// What looks wrong in the data but did not stop the evaluation.
-    #[serde(default, skip_serializing_if = "Suspicions::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Suspicions::is_empty"))]
     pub suspicions: Suspicions,
 }
 
 /// What was evaluated.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DatasetPart {
     /// Name of the data set.
     pub name: String,
@@ -46,16 +46,17 @@ pub struct DatasetPart {
     /// The camera.
     pub camera: String,
     /// Columns and rows of its images.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub image_size_px: Option<[u32; 2]>,
     /// Its first frame, which plots count seconds from.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub first_frame_ns: Option<Stamp>,
 }
 
 /// Whether a stream is what is evaluated or what it is compared with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum Role {
     /// Ground truth or whatever takes its place.
     Reference,
@@ -64,7 +65,8 @@ pub enum Role {
 }
 
 /// Pixel errors of one pose stream with one depth source.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PixelPart {
     /// Name of the pose stream.
     pub stream: String,
@@ -77,19 +79,19 @@ pub struct PixelPart {
     /// RMSE_2D of all points together, pixels; null where nothing was scored.
     pub pooled_rmse_px: Option<f64>,
     /// RMSE_2D of the labels that hold, pixels; null where none does.
-    #[serde(default)]
+    #[cfg_attr(feature = "serde", serde(default))]
     pub held_rmse_px: Option<f64>,
     /// Its 95 % interval, low and high, pixels; null where there is none.
-    #[serde(default)]
+    #[cfg_attr(feature = "serde", serde(default))]
     pub interval_95: Option<[f64; 2]>,
     /// What these two rest on; left out where nothing was scored.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub held: Option<HeldPart>,
     /// The error by age since the key frame.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub by_age: Vec<WindowPart>,
     /// The error by metres that the camera moved since the key frame.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub by_distance: Vec<WindowPart>,
     /// Number of scored samples.
     pub scored: u64,
@@ -98,14 +100,15 @@ pub struct PixelPart {
     /// Key frames that were used, with their depth.
     pub keyframes: Vec<KeyframePart>,
     /// Key frames whose depth is doubtful, and why.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub depth_doubts: Vec<DepthDoubt>,
     /// The scored samples; empty where they were not asked for.
     pub samples: Vec<Sample>,
 }
 
 /// A label that could not be scored.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Skip {
     /// Name of the point.
     pub point: PointName,
@@ -116,27 +119,29 @@ pub struct Skip {
 }
 
 /// A key frame and the depth that lifted its pixel.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct KeyframePart {
     /// Name of the point.
     pub point: PointName,
     /// The frame.
     pub timestamp_ns: Stamp,
     /// Where the label says the point is.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub label_px: Option<Pixel>,
     /// Metres along the optical axis.
     pub depth_z_m: f64,
     /// The lifted point in the stream's own world, metres.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub point_world_m: Option<[f64; 3]>,
     /// The pixel's neighbourhood straddles a depth edge.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "std::ops::Not::not"))]
     pub on_edge: bool,
 }
 
 /// One scored label.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sample {
     /// Name of the point.
     pub point: PointName,
@@ -154,20 +159,23 @@ pub struct Sample {
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PointName(pub Arc<str>);
 
-impl Serialize for PointName {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+#[cfg(feature = "serde")]
+impl serde::Serialize for PointName {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(&self.0)
     }
 }
 
-impl<'de> Deserialize<'de> for PointName {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        String::deserialize(deserializer).map(|text| Self(text.into()))
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for PointName {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        <String as serde::Deserialize>::deserialize(deserializer).map(|text| Self(text.into()))
     }
 }
 
 /// An estimate against the reference, both at the evaluated frames.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TrajectoryPart {
     /// Name of the estimate.
     pub estimate: String,
@@ -184,18 +192,19 @@ pub struct TrajectoryPart {
     /// Mean rotation error between consecutive frames, radians.
     pub roe_rad: Option<f64>,
     /// Why the numbers are null, where they are.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub problem: Option<String>,
     /// The errors over time, for plots; empty where the samples were not asked for.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub frames: Vec<FrameError>,
     /// The error of the motion since each key frame, for plots; empty where the samples were not asked for.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub since_keyframe: Vec<MotionError>,
 }
 
 /// By how much the estimate's motion from a key frame to a labelled frame is off. No alignment enters.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MotionError {
     /// The key frame.
     pub keyframe_ns: Stamp,
@@ -208,7 +217,8 @@ pub struct MotionError {
 }
 
 /// The error of an estimate at a time, after alignment.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FrameError {
     /// When.
     pub timestamp_ns: Stamp,
@@ -221,7 +231,8 @@ pub struct FrameError {
 }
 
 /// Where a stream went between the first and the last evaluated frame: at these frames, and at times between them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PathPart {
     /// Name of the pose stream.
     pub stream: String,
@@ -234,7 +245,8 @@ pub struct PathPart {
 }
 
 /// A pose of the body.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PathPose {
     /// When.
     pub timestamp_ns: Stamp,

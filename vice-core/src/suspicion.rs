@@ -3,23 +3,22 @@
 //! A reader that repairs, leaves out or doubts something adds a [`Suspicion`]; the pipeline collects them into the
 //! result document, so that a warning is never only a log line.
 
-use serde::{Deserialize, Serialize};
-
 /// Something in the data that may make the numbers wrong.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Suspicion {
     /// A stable name in kebab-case, such as `quaternion-order` or `rows-left-out`, for programs.
     pub code: String,
     /// What it is about: a file, a stream, a topic or a camera; empty where it is the whole data set.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "String::is_empty"))]
     pub about: String,
     /// What looks wrong, in a sentence.
     pub message: String,
     /// The numbers that make it look so.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "String::is_empty"))]
     pub evidence: String,
     /// What to do about it.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "String::is_empty"))]
     pub advice: String,
     /// How often the same was seen.
     pub count: u64,
@@ -80,8 +79,9 @@ impl Suspicion {
 }
 
 /// A list of suspicions that holds each one once, in the order in which they were first seen.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(transparent)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(transparent))]
 pub struct Suspicions(Vec<Suspicion>);
 
 impl Suspicions {

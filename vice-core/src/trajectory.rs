@@ -7,6 +7,7 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::frames::{Body, FrameError, Rigid, World, WorldFromBody};
+use crate::statistics::middle;
 use crate::time::{Span, Stamp};
 
 /// One row as a file has it: not checked yet.
@@ -32,6 +33,27 @@ pub struct RelativeMotion {
 }
 
 /// A validated trajectory: strictly increasing stamps, finite unit poses `world_from_body`.
+///
+/// ```
+/// use vice_core::time::{Span, Stamp};
+/// use vice_core::trajectory::{NoPose, PoseRow, Trajectory};
+///
+/// let row = |millis: i64, x_m: f64| PoseRow {
+///     stamp: Stamp::from_nanos(millis * 1_000_000),
+///     position_m: [x_m, 0.0, 1.5],
+///     rotation_wxyz: [1.0, 0.0, 0.0, 0.0],
+/// };
+/// let trajectory = Trajectory::from_rows([row(0, 0.0), row(50, 0.1), row(100, 0.2)])?;
+/// // Between two poses it is interpolated, outside nothing is made up.
+/// let max_gap = Span::from_millis(100);
+/// let pose = trajectory.pose_at(Stamp::from_nanos(75_000_000), max_gap)?;
+/// assert!((pose.translation().x - 0.15).abs() < 1e-12);
+/// assert_eq!(trajectory.pose_at(Stamp::from_nanos(-1), max_gap), Err(NoPose::BeforeStart));
+/// // Rows that are no trajectory are refused, with the row at fault.
+/// let error = Trajectory::from_rows([row(50, 0.0), row(0, 0.1)]).unwrap_err();
+/// assert_eq!(error.row(), Some(1));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
     stamps: Vec<Stamp>,
@@ -238,8 +260,7 @@ impl Trajectory {
     /// The time between two poses, half of them closer; `None` for a single pose.
     pub fn median_spacing(&self) -> Option<Span> {
         let mut spans: Vec<Span> = self.stamps.windows(2).map(|w| w[1].since(w[0])).collect();
-        let middle = spans.len() / 2;
-        (!spans.is_empty()).then(|| *spans.select_nth_unstable(middle).1)
+        middle(&mut spans, Ord::cmp)
     }
 
     /// The pose at `stamp`: linear in position, slerp in rotation, between neighbours at most `max_gap` apart.
@@ -307,9 +328,7 @@ impl Trajectory {
 
     /// Median time between two poses; zero for a single pose.
     pub fn median_period(&self) -> Span {
-        let mut periods: Vec<Span> = self.stamps.windows(2).map(|w| w[1].since(w[0])).collect();
-        periods.sort_unstable();
-        periods.get(periods.len() / 2).copied().unwrap_or(Span::ZERO)
+        self.median_spacing().unwrap_or(Span::ZERO)
     }
 }
 

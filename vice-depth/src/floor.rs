@@ -23,6 +23,34 @@ pub const HORIZON_SINE: f64 = 1e-4;
 /// Depth from a floor plane.
 ///
 /// The plane is the key frame's [`Floor`]. One in the world needs the anchor's pose; one in the body does not.
+///
+/// ```
+/// use vice_core::camera::{Camera, Model, Pixel};
+/// use vice_core::dataset::{Floor, Plane};
+/// use vice_core::depth::{DepthMiss, DepthSource, Keyframe};
+/// use vice_core::frames::Rigid;
+/// use vice_core::nalgebra::{UnitQuaternion, Vector3};
+/// use vice_core::time::Stamp;
+/// use vice_depth::FloorDepth;
+///
+/// // 2 m over the floor z = 0, looking straight down.
+/// let camera = Camera::new(640, 480, [400.0, 400.0, 320.0, 240.0], Model::Pinhole)?;
+/// let down = UnitQuaternion::from_euler_angles(std::f64::consts::PI, 0.0, 0.0);
+/// let keyframe = Keyframe {
+///     stamp: Stamp::from_nanos(0),
+///     frame: 0,
+///     camera: &camera,
+///     body_from_camera: Rigid::identity(),
+///     world_from_camera: Some(Rigid::from_parts(Vector3::new(0.0, 0.0, 2.0), down)),
+///     floor: Floor::World(Plane::z_zero()),
+/// };
+/// let depths = FloorDepth::new().depths(&keyframe, &[Pixel::new(100.0, 80.0)])?;
+/// assert!((depths[0].unwrap().z_m - 2.0).abs() < 1e-12);
+/// // Without a pose the floor of the world is nowhere.
+/// let lost = Keyframe { world_from_camera: None, ..keyframe };
+/// assert_eq!(FloorDepth::new().depths(&lost, &[Pixel::new(100.0, 80.0)])?, [Err(DepthMiss::NoAnchor)]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FloorDepth {
     plane: Option<Plane<World>>,

@@ -5,14 +5,16 @@
 //! and a table are level and large, but only the floor is low. The winner is then fitted by least squares to its
 //! points, and its points found again, until they stay the same.
 
-use nalgebra::{Matrix3, Point3, Unit, Vector3};
+use nalgebra::{Point3, Unit, Vector3};
 use rayon::prelude::*;
 use vice_core::camera::{Camera, Pixel};
 use vice_core::dataset::{DepthImage, Plane};
 use vice_core::error::{DataError, DataResult};
 use vice_core::frames::{self, Rigid, World};
+use vice_core::random::SplitMix;
 
 use crate::cloud::Cloud;
+use crate::scatter::Scatter;
 
 /// Points that planes are tried on; the final fit uses all.
 const SAMPLE: usize = 20_000;
@@ -152,14 +154,8 @@ fn candidate(
     if sample.len() < 3 {
         return None;
     }
-    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut pick = || {
-        // SplitMix64.
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut x = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        sample[((x ^ (x >> 31)) % sample.len() as u64) as usize]
-    };
+    let mut random = SplitMix::new(0x9e37_79b9_7f4a_7c15);
+    let mut pick = || sample[(random.bits() % sample.len() as u64) as usize];
     let level = options.max_tilt_rad.cos();
     let mut planes = Vec::new();
     for _ in 0..MOST_DRAWS {
@@ -201,14 +197,8 @@ fn least_squares(
     if members.len() < 3 {
         return None;
     }
-    let n = members.len() as f64;
-    let mean = members.iter().map(|i| points[*i].coords).sum::<Vector3<f64>>() / n;
-    let mut covariance = Matrix3::zeros();
-    for i in members {
-        let d = points[*i].coords - mean;
-        covariance += d * d.transpose();
-    }
-    let eigen = covariance.symmetric_eigen();
+    let Scatter { mean, squares, .. } = Scatter::of(members.iter().map(|i| points[*i].coords));
+    let eigen = squares.symmetric_eigen();
     let normal: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into();
     let normal = if normal.dot(&up) < 0.0 { -normal } else { normal };
     Some((normal, -normal.dot(&mean)))

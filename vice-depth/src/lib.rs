@@ -17,6 +17,7 @@ pub mod floor_fit;
 pub mod image;
 pub mod mesh;
 mod ply;
+mod scatter;
 #[cfg(test)]
 mod scene;
 mod units;

@@ -5,6 +5,7 @@
 
 use vice_core::camera::Pixel;
 use vice_core::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
+use vice_core::statistics::middle;
 use vice_core::suspicion::Suspicion;
 
 use crate::FloorDepth;
@@ -55,8 +56,7 @@ impl AgainstFloor {
         if n < FEWEST.0 {
             return None;
         }
-        pairs.sort_unstable_by(|a, b| a.1.total_cmp(&b.1));
-        let middle = pairs[n / 2].1;
+        let (_, middle) = middle(&mut pairs, |a, b| a.1.total_cmp(&b.1))?;
         let off = |factor: f64| (factor / middle - 1.0).abs();
         pairs.sort_unstable_by(|a, b| off(a.1).total_cmp(&off(b.1)).then(a.0.total_cmp(&b.0)));
         let near = &pairs[..=3 * n / 4 - 1];

@@ -4,6 +4,7 @@
 
 use nalgebra::{Matrix2, Point3, Vector2};
 use vice_core::camera::{Camera, Pixel};
+use vice_core::statistics::middle;
 
 use crate::gray::Gray;
 use crate::quads::Quad;
@@ -99,17 +100,16 @@ fn line(points: &[(Vector2<f64>, f64)]) -> Option<(Vector2<f64>, Vector2<f64>)> 
             return None;
         }
         let total: f64 = kept.iter().map(|p| p.1).sum();
-        let middle = kept.iter().map(|p| p.0 * p.1).sum::<Vector2<f64>>() / total;
+        let centre = kept.iter().map(|p| p.0 * p.1).sum::<Vector2<f64>>() / total;
         let spread: Matrix2<f64> =
-            kept.iter().map(|p| (p.0 - middle) * (p.0 - middle).transpose() * p.1).sum();
+            kept.iter().map(|p| (p.0 - centre) * (p.0 - centre).transpose() * p.1).sum();
         let eigen = spread.symmetric_eigen();
         let along = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
-        let off = |p: Vector2<f64>| ((p - middle).x * along.y - (p - middle).y * along.x).abs();
+        let off = |p: Vector2<f64>| ((p - centre).x * along.y - (p - centre).y * along.x).abs();
         let mut offs: Vec<f64> = kept.iter().map(|p| off(p.0)).collect();
-        offs.sort_by(f64::total_cmp);
-        let limit = 4.0 * offs[offs.len() / 2];
+        let limit = 4.0 * middle(&mut offs, f64::total_cmp)?;
         kept.retain(|p| off(p.0) <= limit);
-        fitted = Some((middle, along));
+        fitted = Some((centre, along));
     }
     fitted
 }

@@ -8,7 +8,7 @@ use vice_core::error::{DataError, ErrorKind};
 use vice_core::time::Stamp;
 use vice_core::trajectory::Trajectory;
 use vice_files::leniency;
-use vice_files::trajectory::{ReadOptions, read_spec};
+use vice_files::trajectory::ReadOptions;
 
 use crate::diagnosis::DiagnosisResult;
 use crate::error::{RunError, RunResult};
@@ -46,7 +46,7 @@ impl Conversion {
         let is_stream = dataset.streams().contains(&name);
         let file = self.stream.path().is_some_and(|path| path.is_file());
         let mut trajectory = if !is_stream && file {
-            let read = read_spec(&name, &ReadOptions::default())?;
+            let read = self.stream.read_file(&ReadOptions::default())?;
             leniency::log(&read.suspicions);
             read.trajectory
         } else {

@@ -7,8 +7,7 @@ use std::sync::Arc;
 use vice_core::dataset::{Dataset, GROUND_TRUTH, OpenOptions};
 use vice_core::depth::DepthSource;
 use vice_core::diagnose::{Diagnosis, Flaw, Options, diagnose};
-use vice_core::evaluate::{Evaluation, Selection, Stream, Window, evaluate};
-use vice_core::metrics::align::Alignment;
+use vice_core::evaluate::{DatasetRig, Evaluation, Selection, Stream, Window, evaluate};
 use vice_core::result::{PixelPart, Role};
 use vice_core::time::Stamp;
 use vice_depth::{CloudOptions, FloorDepth, ZMapDepth, ZMapOptions, load_cloud};
@@ -24,7 +23,7 @@ use crate::report::numbers::{first_and_last, mean};
 use crate::report::overlay::{Canvas, Colour, ESTIMATE_GREEN, ESTIMATE_YELLOW, LABEL_BLUE};
 use crate::report::table;
 use crate::request::DepthName;
-use crate::request::{DEFAULT_MAX_GAP, EstimateSpec, Request};
+use crate::request::{EstimateSpec, Request};
 use crate::result::{ResultDocument, Used};
 
 /// The estimates that are shown, the colours of their dots, and what is wrong with them.
@@ -108,27 +107,17 @@ fn evaluate_flight(
     let zmap = ZMapDepth::new(points, cloud.world_from_cloud, ZMapOptions::default());
     let floor = FloorDepth::new();
     let sources: [&dyn DepthSource; 2] = [&floor, &zmap];
-    let evaluation = Evaluation {
-        dataset: flight,
-        camera_name: &camera_name,
-        camera: &camera,
-        frames: &frames,
-        selection: &selection,
-        streams: &streams,
-        anchor: 0,
-        own_anchors: false,
-        depths: &sources,
-        checks: &[],
-        max_gap: DEFAULT_MAX_GAP,
-        subsets: None,
-        align: Alignment::Se3,
-        keep_samples: true,
-    };
+    let rig = DatasetRig::new(flight, &camera_name);
+    let evaluation = Evaluation::builder(&rig, &camera, &frames, &selection)
+        .streams(&streams)
+        .depths(&sources)
+        .keep_samples(true)
+        .build();
     let used = Used {
         points: selection.point_names().map(str::to_string).collect(),
         anchor: GROUND_TRUTH.to_string(),
         time_offset_s: 0.0,
-        align: Alignment::Se3.name().to_string(),
+        align: evaluation.align.name().to_string(),
     };
     let document = ResultDocument::new(request(kept), used, evaluate(&evaluation, &|_, _| {})?);
     let verdicts = diagnose_estimates(&evaluation, progress)?;

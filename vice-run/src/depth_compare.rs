@@ -5,6 +5,7 @@ use vice_core::camera::Pixel;
 use vice_core::depth::{DepthMiss, DepthSample, DepthSource};
 use vice_core::evaluate::{SelectedKeyframe, Selection};
 use vice_core::frames::WorldFromCamera;
+use vice_core::statistics::{quantile, sorted};
 use vice_core::suspicion::Suspicions;
 use vice_core::time::Stamp;
 use vice_core::track::{lift, track};
@@ -164,11 +165,10 @@ pub fn render(document: &DepthComparison) -> String {
     }
     let all_costs = mean(document.key_points.iter().flat_map(|k| &k.cost).map(|c| c.px_per_mm));
     for (i, source) in document.sources.iter().enumerate().skip(1) {
-        let mut sizes: Vec<f64> =
-            document.key_points.iter().filter_map(|k| difference_mm(k, i)).map(f64::abs).collect();
-        sizes.sort_unstable_by(f64::total_cmp);
+        let sizes =
+            sorted(document.key_points.iter().filter_map(|k| difference_mm(k, i)).map(f64::abs).collect());
         let answered = sizes.len();
-        let Some((median, largest)) = median_of(&sizes).zip(sizes.last()) else {
+        let Some((median, largest)) = quantile(&sizes, 0.5).zip(sizes.last()) else {
             summary.push_str(&format!("{source} and {} answer no key point together\n", document.sources[0]));
             continue;
         };
@@ -188,12 +188,6 @@ pub fn render(document: &DepthComparison) -> String {
     format!("{}\n{summary}", table::align(&grid))
 }
 
-/// The median of sorted values.
-fn median_of(sorted: &[f64]) -> Option<f64> {
-    let (low, high) = (sorted.get(sorted.len().checked_sub(1)? / 2)?, sorted.get(sorted.len() / 2)?);
-    Some(0.5 * (low + high))
-}
-
 fn difference_mm(k: &KeyPoint, source: usize) -> Option<f64> {
     Some((k.depths[source].depth_z_m? - k.depths[0].depth_z_m?) * 1000.0)
 }
@@ -205,14 +199,4 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 fn dash(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| "-".to_string(), |v| format!("{v:.decimals$}"))
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn the_median_of_an_even_count_is_between_its_middle_two() {
-        let median = |v: &[f64]| super::median_of(v);
-        assert_eq!((median(&[]), median(&[3.0]), median(&[1.0, 2.0])), (None, Some(3.0), Some(1.5)));
-        assert_eq!(median(&[7.4, 9.8, 11.5, 12.1, 13.5, 28.9, 34.3, 73.4]), Some(12.8));
-    }
 }

@@ -2,6 +2,7 @@
 
 use vice_core::dataset::DepthImage;
 use vice_core::depth::DepthMiss;
+use vice_core::statistics::{median, quantile, sorted};
 use vice_core::suspicion::Suspicions;
 use vice_depth::{DepthMap, depth_image};
 use vice_files::image_file::{encode_depth_png, encode_png};
@@ -103,34 +104,28 @@ fn millimetres(name: &str, image: &DepthImage) -> RunResult<Vec<u8>> {
 
 fn summary(name: &str, map: &DepthMap) -> Vec<String> {
     let mut z: Vec<f64> = map.z_m().into_iter().filter(|z| z.is_finite()).collect();
-    z.sort_unstable_by(f64::total_cmp);
     let share = 100.0 * map.answered() as f64 / map.pixels().len() as f64;
     let misses: Vec<String> = map.misses().iter().map(|(miss, n)| format!("{n}: {miss}")).collect();
     vec![
         name.to_string(),
         format!("{} ({share:.1} %)", map.answered()),
-        z.get(z.len() / 2).map_or_else(|| "-".to_string(), |z| format!("{z:.3}")),
+        median(&mut z).map_or_else(|| "-".to_string(), |z| format!("{z:.3}")),
         if misses.is_empty() { "-".to_string() } else { misses.join("; ") },
     ]
 }
 
 /// Percentiles of a difference over the pixels that both sources answer.
 fn percentiles(first: &str, second: &str, difference: &[f32]) -> String {
-    let mut metres: Vec<f32> = difference.iter().copied().filter(|d| d.is_finite()).collect();
-    if metres.is_empty() {
+    let metres = sorted(difference.iter().filter(|d| d.is_finite()).map(|d| f64::from(*d)).collect());
+    let shares = [("5 %", 0.05), ("25 %", 0.25), ("median", 0.5), ("75 %", 0.75), ("95 %", 0.95)];
+    let each = shares.iter().filter_map(|(name, share)| {
+        quantile(&metres, *share).map(|metres| format!("{name} {:.1}", metres * 1000.0))
+    });
+    let each: Vec<String> = each.collect();
+    if each.is_empty() {
         return format!("{first} and {second} answer no pixel together\n");
     }
-    metres.sort_unstable_by(f32::total_cmp);
-    let at = |p: f64| f64::from(metres[((metres.len() - 1) as f64 * p).round() as usize]) * 1000.0;
-    format!(
-        "{first} - {second} over {} pixels, mm: 5 % {:.1}, 25 % {:.1}, median {:.1}, 75 % {:.1}, 95 % {:.1}\n",
-        metres.len(),
-        at(0.05),
-        at(0.25),
-        at(0.5),
-        at(0.75),
-        at(0.95)
-    )
+    format!("{first} - {second} over {} pixels, mm: {}\n", metres.len(), each.join(", "))
 }
 
 #[cfg(test)]

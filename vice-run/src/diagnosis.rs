@@ -112,7 +112,7 @@ pub fn diagnose_all(
 
 /// What was doubted of the data, the depths and the streams.
 fn suspicions(evaluation: &Evaluation<'_>, streams: &LoadedStreams) -> Suspicions {
-    let mut list: Suspicions = evaluation.dataset.suspicions().into_iter().collect();
+    let mut list: Suspicions = evaluation.rig.suspicions().into_iter().collect();
     list.extend(evaluation.depths.iter().flat_map(|source| source.suspicions()));
     list.extend(streams.suspicions.clone());
     list
@@ -180,7 +180,7 @@ fn corrected(
     file.time_offset = Some(Span::from_secs_f64(offset_s)?);
     let camera = theta.correct_camera(evaluation.camera)?;
     let body_from_camera = corrected_extrinsics(opened, evaluation, theta)?;
-    file.insert(evaluation.camera_name, CameraOverride::of(&camera, body_from_camera));
+    file.insert(evaluation.rig.camera_name(), CameraOverride::of(&camera, body_from_camera));
     Ok(file)
 }
 
@@ -201,7 +201,7 @@ fn corrected_extrinsics(
     if !wrong {
         return Ok(None);
     }
-    let at = |stamp: &Stamp| evaluation.dataset.body_from_camera(evaluation.camera_name, *stamp);
+    let at = |stamp: &Stamp| evaluation.rig.body_from_camera(*stamp);
     let (Some(first), Some(last)) = (evaluation.frames.first(), evaluation.frames.last()) else {
         return Err(RunError::missing("the camera has no frames"));
     };

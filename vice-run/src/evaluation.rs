@@ -84,7 +84,9 @@ impl Request {
         let checks: Vec<&dyn DepthSource> = checks.iter().map(AsRef::as_ref).collect();
         self.with_evaluation(opened, keep, |evaluation, streams| {
             let step = |done, total| progress("evaluating", done, total);
-            let evaluation = &Evaluation { checks: &checks, ..*evaluation };
+            let mut evaluation = *evaluation;
+            evaluation.checks = &checks;
+            let evaluation = &evaluation;
             let mut found = match samples {
                 Samples::Stream(sink) => evaluate_streaming(evaluation, &step, sink)?,
                 _ => evaluate(evaluation, &step)?,
@@ -141,22 +143,17 @@ impl Request {
             // What is asked for goes before what a stream would have by itself.
             streams.list.iter_mut().for_each(|s| s.align = None);
         }
-        let evaluation = Evaluation {
-            dataset: opened.dataset.as_ref(),
-            camera_name: &opened.camera_name,
-            camera: &opened.camera,
-            frames: &opened.frames,
-            selection: &selection,
-            streams: &streams.list,
-            anchor: streams.anchor,
-            own_anchors: streams.own_anchors,
-            depths: &sources,
-            checks: &[],
-            max_gap: self.streams.max_gap,
-            subsets: (!self.scoring.subsets.is_empty()).then_some(self.scoring.subsets.as_slice()),
-            align: self.scoring.align.unwrap_or_default(),
-            keep_samples,
-        };
+        let rig = opened.rig();
+        let evaluation = Evaluation::builder(&rig, &opened.camera, &opened.frames, &selection)
+            .streams(&streams.list)
+            .anchor(streams.anchor)
+            .own_anchors(streams.own_anchors)
+            .depths(&sources)
+            .max_gap(self.streams.max_gap)
+            .subsets((!self.scoring.subsets.is_empty()).then_some(self.scoring.subsets.as_slice()))
+            .align(self.scoring.align.unwrap_or_default())
+            .keep_samples(keep_samples)
+            .build();
         work(&evaluation, &streams)
     }
 }

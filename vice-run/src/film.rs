@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use vice_core::dataset::{Dataset, Image};
+use vice_core::statistics::middle;
 use vice_core::time::Stamp;
 use vice_files::atomic::{Overwrite, prepare_folder, write};
 use vice_files::image_file::encode_png;
@@ -111,8 +112,7 @@ impl Frames<'_> {
 fn usual_rate_hz(stamps: impl Iterator<Item = Stamp>) -> f64 {
     let stamps: Vec<Stamp> = stamps.collect();
     let mut steps: Vec<f64> = stamps.windows(2).map(|w| w[1].since(w[0]).as_secs_f64()).collect();
-    steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).map_or(10.0, |step| (1.0 / step).clamp(1.0, 60.0))
+    middle(&mut steps, f64::total_cmp).map_or(10.0, |step| (1.0 / step).clamp(1.0, 60.0))
 }
 
 #[cfg(test)]

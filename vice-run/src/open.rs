@@ -5,7 +5,7 @@ use std::sync::Arc;
 use vice_core::camera::Camera;
 use vice_core::dataset::{Calibrated, Dataset, Floor, OpenOptions, Plane};
 use vice_core::error::ErrorKind;
-use vice_core::evaluate::Observations;
+use vice_core::evaluate::{DatasetRig, Observations};
 use vice_core::frames::World;
 use vice_core::registry::Registry;
 use vice_core::suspicion::Suspicion;
@@ -160,6 +160,11 @@ impl Protocol {
 }
 
 impl Opened {
+    /// The camera in use, and the floor, as an evaluation asks for them.
+    pub fn rig(&self) -> DatasetRig<'_> {
+        DatasetRig::new(self.dataset.as_ref(), &self.camera_name)
+    }
+
     /// What looked wrong in what was read beside the data set itself.
     pub fn suspicions(&self) -> impl Iterator<Item = Suspicion> {
         self.calibration.iter().flat_map(|file| file.suspicions().iter().cloned())

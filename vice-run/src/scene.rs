@@ -4,7 +4,7 @@ use vice_core::dataset::GROUND_TRUTH;
 use vice_core::depth::Keyframe;
 use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
-use vice_files::trajectory::{ReadOptions, read_spec};
+use vice_files::trajectory::ReadOptions;
 
 use crate::error::{RunError, RunResult};
 use crate::open::Opened;
@@ -34,9 +34,7 @@ impl Scene {
             ReferenceSpec::Named(spec) if is_stream(&spec.to_string()) => {
                 Some(opened.dataset.trajectory(&spec.to_string())?)
             }
-            ReferenceSpec::Named(spec) => {
-                Some(read_spec(&spec.to_string(), &ReadOptions::default())?.trajectory)
-            }
+            ReferenceSpec::Named(spec) => Some(spec.read_file(&ReadOptions::default())?.trajectory),
             ReferenceSpec::Default if is_stream(GROUND_TRUTH) => {
                 Some(opened.dataset.trajectory(GROUND_TRUTH)?)
             }

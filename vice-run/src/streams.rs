@@ -19,7 +19,7 @@ use vice_core::suspicion::{Suspicion, Suspicions};
 use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::{Trajectory, in_other_world};
 use vice_files::rigid_file;
-use vice_files::trajectory::{ReadOptions, TrajectoryFormat, read_spec};
+use vice_files::trajectory::{ReadOptions, TrajectoryFormat};
 
 use crate::error::{RunError, RunResult};
 use crate::imu_start::ImuStart;
@@ -198,7 +198,7 @@ impl Loader<'_> {
             .of(field));
         }
         let options = ReadOptions { times: self.spec.times.clone(), ..ReadOptions::default() };
-        let read = read_spec(&name, &options)?;
+        let read = spec.read_file(&options)?;
         if read.format == TrajectoryFormat::Kitti {
             self.formats.insert("kitti");
         }

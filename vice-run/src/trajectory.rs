@@ -13,7 +13,7 @@ use vice_core::metrics::trajectory::{Ape, ApeErrors, Statistics, Summary};
 use vice_core::suspicion::{Suspicion, Suspicions};
 use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
-use vice_files::trajectory::{ReadOptions, TrajectoryFormat, read_spec};
+use vice_files::trajectory::{ReadOptions, TrajectoryFormat};
 
 use crate::error::{Context, RunError, RunResult};
 use crate::report::evo_zip::{self, About};
@@ -244,7 +244,7 @@ impl TrajectoryRequest {
     /// Two KITTI files without times are compared row by row; one alone has no clock to compare by.
     fn read_both(&self) -> RunResult<Both> {
         let read = |spec: &EstimateSpec, index_as_seconds| {
-            read_spec(&spec.to_string(), &ReadOptions { times: self.times.clone(), index_as_seconds })
+            spec.read_file(&ReadOptions { times: self.times.clone(), index_as_seconds })
         };
         let (reference, estimate) =
             rayon::join(|| read(&self.reference, true), || read(&self.estimate, true));

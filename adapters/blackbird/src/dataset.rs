@@ -9,6 +9,7 @@ use vice_core::dataset::{Dataset, DepthImage, Fact, Floor, GROUND_TRUTH, Image, 
 use vice_core::error::{DataError, DataResult};
 use vice_core::frames::{BodyFromCamera, World};
 use vice_core::imu::{ImuSample, InertialState};
+use vice_core::statistics::middle;
 use vice_core::suspicion::{Suspicion, Suspicions};
 use vice_core::time::{Span, Stamp};
 use vice_core::time_unit::unit_mixup;
@@ -244,8 +245,7 @@ impl Dataset for BlackbirdDataset {
 /// Half the median time between frames.
 fn half_period(frames: &[Stamp]) -> Span {
     let mut periods: Vec<i64> = frames.windows(2).map(|w| w[1].since(w[0]).as_nanos()).collect();
-    periods.sort_unstable();
-    Span::from_nanos(periods.get(periods.len() / 2).copied().unwrap_or(0) / 2)
+    Span::from_nanos(middle(&mut periods, Ord::cmp).unwrap_or(0) / 2)
 }
 
 #[cfg(test)]

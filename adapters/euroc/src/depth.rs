@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 
 use vice_core::dataset::DepthImage;
 use vice_core::error::DataResult;
+use vice_core::statistics::middle;
 use vice_core::suspicion::Suspicion;
 use vice_core::time::{Span, Stamp};
 use vice_files::image_file;
@@ -69,11 +70,7 @@ impl EurocDepth {
 
     fn implausible(&self, image: &DepthImage) -> Option<Suspicion> {
         let mut valid: Vec<f32> = image.z_m().iter().copied().filter(|z| !z.is_nan()).collect();
-        if valid.is_empty() {
-            return None;
-        }
-        let middle = valid.len() / 2;
-        let median = *valid.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let median = middle(&mut valid, f32::total_cmp)?;
         (!(IMPLAUSIBLE_BELOW_M..=IMPLAUSIBLE_ABOVE_M).contains(&median)).then(|| {
             let file = self.folder.join(sensor::SENSOR_FILE);
             Suspicion::new(

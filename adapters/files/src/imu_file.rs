@@ -6,6 +6,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::imu::ImuSample;
+use vice_core::statistics::middle;
 use vice_core::suspicion::{Suspicion, Suspicions};
 
 use crate::columns::{Quantity, TimeUnit};
@@ -157,8 +158,7 @@ fn implausible(samples: &[ImuSample], about: &str) -> Option<Suspicion> {
     }
     let median = |length: &dyn Fn(&ImuSample) -> f64| {
         let mut lengths: Vec<f64> = samples.iter().map(length).collect();
-        let middle = lengths.len() / 2;
-        *lengths.select_nth_unstable_by(middle, f64::total_cmp).1
+        middle(&mut lengths, f64::total_cmp).unwrap_or(0.0)
     };
     let (gyro, accel) = (median(&|s| s.gyro_rad_s.norm()), median(&|s| s.accel_m_s2.norm()));
     let gravity = |v: f64| (8.5..11.5).contains(&v);

@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use vice_core::dataset::OpenOptions;
 use vice_core::error::{DataError, DataResult, ErrorKind};
+use vice_core::statistics::middle;
 use vice_core::suspicion::Suspicion;
 use vice_core::time::Span;
 
@@ -278,7 +279,6 @@ fn depth_offset(settings: &Settings, color: Option<&Images>) -> DataResult<Span>
     }
     let stamps = color.map_or(&[][..], |c| &c.stamps);
     let mut periods: Vec<Span> = stamps.windows(2).map(|w| w[1].since(w[0])).collect();
-    periods.sort_unstable();
-    let median = periods.get(periods.len() / 2);
+    let median = middle(&mut periods, Ord::cmp);
     Ok(median.map_or(LONE_FRAME_OFFSET, |p| Span::from_nanos(p.as_nanos() / 2)))
 }

@@ -4,6 +4,7 @@
 //! publish the same edge of tf or the same topic do nothing else, in whatever rhythm.
 
 use vice_core::frames::rotation_angle_rad;
+use vice_core::statistics::middle;
 use vice_core::suspicion::Suspicion;
 
 use crate::doubts::TWO_SOURCES;
@@ -32,12 +33,10 @@ pub(crate) struct ToAndFro {
 /// Looks for two sources in a series of `n` values, given how far apart any two of them are.
 pub(crate) fn find(n: usize, smallest: f64, distance: impl Fn(usize, usize) -> f64) -> Option<ToAndFro> {
     let steps: Vec<f64> = (1..n).map(|i| distance(i - 1, i)).collect();
-    let mut sorted = steps.clone();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let middle = sorted.get(sorted.len() / 2)?;
+    let usual = middle(&mut steps.clone(), f64::total_cmp)?;
     // Where one source answers now and then between many of the other, and the robot is fast, only jumps among the
     // steps count; where the two alternate, each step is a jump.
-    let limits = [smallest, (middle * ABOVE_MIDDLE).max(smallest)];
+    let limits = [smallest, (usual * ABOVE_MIDDLE).max(smallest)];
     limits.into_iter().find_map(|limit| jumps(&steps, limit, &distance))
 }
 
@@ -50,8 +49,8 @@ fn jumps(steps: &[f64], limit: f64, distance: &impl Fn(usize, usize) -> f64) -> 
     };
     let mut back: Vec<f64> = jumps.windows(2).filter_map(comes_back).collect();
     let enough = back.len() as u64 >= FEWEST && back.len() as f64 >= SHARE * (jumps.len() - 1) as f64;
-    back.sort_unstable_by(f64::total_cmp);
-    enough.then(|| ToAndFro { times: back.len() as u64, middle: back[back.len() / 2] })
+    let middle = middle(&mut back, f64::total_cmp)?;
+    enough.then_some(ToAndFro { times: back.len() as u64, middle })
 }
 
 /// The doubt about poses in the order of their stamps.
@@ -77,6 +76,7 @@ mod tests {
     use super::*;
     use nalgebra::{UnitQuaternion, Vector3};
     use vice_core::frames::Rigid;
+    use vice_core::random::SplitMix;
 
     fn of(xs: &[f64]) -> Option<ToAndFro> {
         find(xs.len(), 0.02, |a, b| (xs[a] - xs[b]).abs())
@@ -111,12 +111,8 @@ mod tests {
         let drives: Vec<f64> = (0..200).map(|i| 0.1 * f64::from(i)).collect();
         let shakes: Vec<f64> = (0..400).map(|i| 0.5 * (0.9 * f64::from(i)).sin()).collect();
         let jumps_once: Vec<f64> = (0..100).map(|i| if i < 50 { 0.0 } else { 3.0 }).collect();
-        let mut random = 12345_u64;
-        let mut next = || {
-            random = random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (random >> 33) as f64 / f64::from(1_u32 << 31)
-        };
-        let noisy: Vec<f64> = (0..2000).map(|_| (0..12).map(|_| next()).sum::<f64>() - 6.0).collect();
+        let mut random = SplitMix::new(12345);
+        let noisy: Vec<f64> = (0..2000).map(|_| random.normal()).collect();
         let outliers: Vec<f64> = (0..100).map(|i| if i == 30 || i == 60 { 9.0 } else { 0.0 }).collect();
         for series in [drives, shakes, jumps_once, noisy, outliers, vec![], vec![0.0], vec![0.0, 9.0]] {
             assert_eq!(of(&series), None);

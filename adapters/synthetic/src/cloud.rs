@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use rayon::prelude::*;
 
-use crate::rng::{hash, unit};
+use crate::hash::{hash, unit};
 use crate::scene::{Scene, SurfaceKind};
 
 /// Points of a jittered grid of that spacing (metres) on all faces, exact to float rounding.

@@ -3,11 +3,11 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use vice_core::error::{DataError, DataResult};
 use vice_core::frames::Rigid;
+use vice_core::random::SplitMix;
 use vice_core::time::Span;
 use vice_core::trajectory::{RelativeMotion, Trajectory};
 
 use crate::options::Flaws;
-use crate::rng::Rng;
 
 /// The names of the estimates, in the order in which they are listed.
 pub const ESTIMATES: [&str; 5] = ["exact", "drift", "clock-offset", "wrong-extrinsic", "white-noise"];
@@ -51,7 +51,7 @@ fn drifting(truth: &Trajectory, flaws: &Flaws) -> DataResult<Trajectory> {
 }
 
 fn noisy(truth: &Trajectory, flaws: &Flaws, seed: u64) -> Trajectory {
-    let mut rng = Rng::new(seed, 3);
+    let mut rng = SplitMix::for_purpose(seed, 3);
     truth.map_poses(|_, pose| {
         let mut vector = |sigma: f64| Vector3::from_fn(|_, _| sigma * rng.normal());
         let position = pose.translation() + vector(flaws.noise_position_m);

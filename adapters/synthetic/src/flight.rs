@@ -10,8 +10,7 @@ use std::ops::{Add, Mul};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use vice_core::frames::{BodyFromCamera, Rigid, WorldFromBody};
 use vice_core::imu::GRAVITY_Z_UP_M_S2;
-
-use crate::rng::Rng;
+use vice_core::random::SplitMix;
 
 /// A number and its first two derivatives by time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,7 +68,7 @@ struct Wave {
 }
 
 impl Wave {
-    fn new(base: f64, slope: f64, terms: [(f64, f64); 2], rng: &mut Rng) -> Self {
+    fn new(base: f64, slope: f64, terms: [(f64, f64); 2], rng: &mut SplitMix) -> Self {
         Self { base, slope, terms: terms.map(|(a, w)| (a, w, rng.uniform(0.0, TAU))) }
     }
 
@@ -141,7 +140,7 @@ impl Attitude {
 impl Flight {
     /// The flight of a seed.
     pub fn new(seed: u64) -> Self {
-        let mut rng = Rng::new(seed, 2);
+        let mut rng = SplitMix::for_purpose(seed, 2);
         let sense = if rng.uniform(0.0, 1.0) < 0.5 { -1.0 } else { 1.0 };
         let degrees = |a: f64| a.to_radians();
         Self {

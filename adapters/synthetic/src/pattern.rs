@@ -3,7 +3,7 @@
 //! Each takes the width of a pixel on the surface (`w`, metres) and answers with its mean over about that width, so
 //! that a pattern finer than a pixel fades to its average instead of flickering.
 
-use crate::rng::{hash, unit};
+use crate::hash::{hash, unit};
 
 /// A point on a surface, with the width of a pixel there along both coordinates, metres.
 #[derive(Clone, Copy, Debug)]

@@ -7,9 +7,9 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use parry3d::math::Vector as ParryVector;
 use parry3d::query::{Ray, RayCast};
 use parry3d::shape::Cuboid;
+use vice_core::random::SplitMix;
 
 use crate::material::Material;
-use crate::rng::Rng;
 
 /// Width and depth of the room, metres; its middle is the origin of the world.
 pub const ROOM_SIDE_M: f64 = 8.0;
@@ -164,7 +164,7 @@ impl Solid {
 impl Scene {
     /// The room of a seed.
     pub fn new(seed: u64) -> Self {
-        let mut rng = Rng::new(seed, 1);
+        let mut rng = SplitMix::for_purpose(seed, 1);
         let mut scene = Self { solids: Vec::new(), faces: Vec::new() };
         let room = Solid::new([ROOM_SIDE_M, ROOM_SIDE_M, ROOM_HEIGHT_M], [0.0; 3], 0.0);
         scene.add_room(room, &mut rng);
@@ -173,20 +173,20 @@ impl Scene {
         scene
     }
 
-    fn add_room(&mut self, room: Solid, rng: &mut Rng) {
+    fn add_room(&mut self, room: Solid, rng: &mut SplitMix) {
         let materials = [
             (SurfaceKind::Wall, Material::WindowWall),
             (SurfaceKind::Wall, Material::Bricks),
             (SurfaceKind::Wall, Material::DoorWall),
-            (SurfaceKind::Wall, Material::PosterWall(rng.bits())),
+            (SurfaceKind::Wall, Material::PosterWall(rng.bits32())),
             (SurfaceKind::Ceiling, Material::Plaster),
-            (SurfaceKind::Floor, Material::Tiles(rng.bits())),
+            (SurfaceKind::Floor, Material::Tiles(rng.bits32())),
         ];
         self.add(room, -1.0, materials);
     }
 
     /// Boxes in the middle, which the flight circles, with one on top of another: depth edges from every side.
-    fn add_middle(&mut self, rng: &mut Rng) {
+    fn add_middle(&mut self, rng: &mut SplitMix) {
         let mut placed: Vec<(f64, f64, f64)> = Vec::new();
         let first = rng.uniform(0.0, std::f64::consts::TAU);
         for i in 0..4_u8 {
@@ -206,31 +206,31 @@ impl Scene {
             placed.push((x, y, reach));
             let yaw = rng.uniform(0.0, std::f64::consts::PI);
             let material =
-                if i % 2 == 0 { Material::Crate(rng.bits()) } else { Material::Cardboard(rng.bits()) };
+                if i % 2 == 0 { Material::Crate(rng.bits32()) } else { Material::Cardboard(rng.bits32()) };
             self.add_box(Solid::new(size, [x, y, 0.0], yaw), material);
             if i == 0 {
                 let top = [size[0] * 0.55, size[1] * 0.6, rng.uniform(0.2, 0.28)];
                 let turned = yaw + rng.uniform(0.2, 0.6);
-                self.add_box(Solid::new(top, [x, y, size[2]], turned), Material::Cardboard(rng.bits()));
+                self.add_box(Solid::new(top, [x, y, size[2]], turned), Material::Cardboard(rng.bits32()));
             }
         }
     }
 
     /// Furniture in the corners and along the walls, outside the flight's circle.
-    fn add_corners(&mut self, rng: &mut Rng) {
+    fn add_corners(&mut self, rng: &mut SplitMix) {
         for (i, (sx, sy)) in [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].into_iter().enumerate() {
             let size = [rng.uniform(0.7, 0.95), rng.uniform(0.5, 0.8), rng.uniform(0.6, 1.7)];
             let back = ROOM_SIDE_M / 2.0 - 0.05;
             let base = [sx * (back - size[0] / 2.0), sy * (back - size[1] / 2.0), 0.0];
             let material =
-                if i % 2 == 0 { Material::Cabinet(rng.bits()) } else { Material::Crate(rng.bits()) };
+                if i % 2 == 0 { Material::Cabinet(rng.bits32()) } else { Material::Crate(rng.bits32()) };
             self.add_box(Solid::new(size, base, 0.0), material);
         }
         for (x, y) in [(0.0, 1.0), (0.0, -1.0)] {
             let size = [rng.uniform(0.5, 0.7), 0.45, rng.uniform(0.35, 0.6)];
             let along = rng.uniform(-1.4, 1.4);
             let base = [x + along, y * (ROOM_SIDE_M / 2.0 - 0.3), 0.0];
-            self.add_box(Solid::new(size, base, rng.uniform(-0.08, 0.08)), Material::Cardboard(rng.bits()));
+            self.add_box(Solid::new(size, base, rng.uniform(-0.08, 0.08)), Material::Cardboard(rng.bits32()));
         }
     }
 

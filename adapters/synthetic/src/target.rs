@@ -7,8 +7,9 @@ use rayon::prelude::*;
 use vice_core::camera::{Camera, Pixel};
 use vice_core::dataset::{Image, PixelFormat};
 use vice_core::error::{DataError, DataResult};
+use vice_core::random::SplitMix;
 
-use crate::rng::{Rng, hash, unit};
+use crate::hash::{hash, unit};
 
 /// Rays along each side of a pixel.
 const RAYS: i32 = 4;
@@ -155,7 +156,7 @@ pub fn render_targets(camera: &Camera, targets: &[Target], shot: &Shot) -> DataR
         })
         .collect();
     let blurred = blur(&sharp, w, h, shot.blur_px);
-    let mut rng = Rng::new(shot.seed, 0x7461_7267);
+    let mut rng = SplitMix::for_purpose(shot.seed, 0x7461_7267);
     let bytes = blurred.iter().map(|v| (v + shot.noise * rng.normal()).round().clamp(0.0, 255.0) as u8);
     Image::new(camera.width(), camera.height(), PixelFormat::Gray8, bytes.collect())
 }

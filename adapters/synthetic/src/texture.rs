@@ -3,9 +3,9 @@
 //! Albedo is a number between 0 (black) and 1 (white) at a place on a face. Every material mixes scales, so that there
 //! are corners to track from half a metre as well as from seven.
 
+use crate::hash::{hash, unit};
 use crate::material::Material;
 use crate::pattern::{Spot, band, checker, digit, inside, lines, noise, rectangle, resolved, speckles, step};
-use crate::rng::{hash, unit};
 use crate::scene::Face;
 
 /// Albedo of a face at a spot.

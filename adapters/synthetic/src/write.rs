@@ -236,7 +236,7 @@ mod tests {
     use crate::options::SyntheticOptions;
     use std::sync::Mutex;
     use vice_files::image_file;
-    use vice_files::trajectory::{ReadOptions, read, read_spec};
+    use vice_files::trajectory::{ReadOptions, read, read_relative};
 
     fn small() -> Synthetic {
         let options = SyntheticOptions {
@@ -263,9 +263,8 @@ mod tests {
             fs::read_dir(out.parent().unwrap()).unwrap().map(|e| e.unwrap().file_name()).collect();
         assert_eq!(beside, ["flight"], "nothing is left beside the folder");
 
-        let poses = |name: &str| read_spec(name, &ReadOptions::default()).unwrap();
-        let at = |name: &str| out.join(name).to_str().unwrap().to_string();
-        let truth = poses(&at("mav0/state_groundtruth_estimate0/data.csv"));
+        let truth = out.join("mav0/state_groundtruth_estimate0/data.csv");
+        let truth = read(truth, &ReadOptions::default()).unwrap();
         assert_eq!(truth.trajectory.stamps(), synthetic.truth().stamps());
         assert_eq!(truth.inertial.unwrap()[3].gyro_bias_rad_s, synthetic.options().gyro_bias_rad_s);
         for (name, estimate) in synthetic.estimates() {
@@ -275,7 +274,7 @@ mod tests {
                 assert!(p.rotation().angle_to(&q.rotation()) < 1e-12);
             }
         }
-        let relative = poses(&format!("rel:{}", at("estimates/exact_relative.txt")));
+        let relative = read_relative(out.join("estimates/exact_relative.txt")).unwrap();
         assert_eq!(relative.trajectory.stamps(), synthetic.truth().stamps());
         let labels = labels::read(out.join("labels/scene.csv"), None).unwrap();
         let exact = synthetic.scene_labels().unwrap();

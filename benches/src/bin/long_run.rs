@@ -15,9 +15,10 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
-use vice_benches::{Numbers, radtan};
+use vice_benches::radtan;
 use vice_core::camera::{Camera, Pixel};
 use vice_core::frames::WorldFromCamera;
+use vice_core::random::Congruential;
 
 const START_NS: u64 = 1_600_000_000_000_000_000;
 const FRAME_NS: u64 = 50_000_000;
@@ -107,7 +108,7 @@ fn write_flight(folder: &Path, duration_ns: u64, points: u64) -> Result<(), Box<
     let mut listing = create(&images.join("data.csv"))?;
     let mut poses = create(&truth.join("data.csv"))?;
     let mut estimate = create(&folder.join("estimate.txt"))?;
-    let mut numbers = Numbers::new(3);
+    let mut numbers = Congruential::new(3);
     writeln!(listing, "#timestamp [ns],filename")?;
     writeln!(poses, "#timestamp,p_x,p_y,p_z,q_w,q_x,q_y,q_z")?;
     for ns in (0..=duration_ns).step_by(POSE_NS as usize) {
@@ -115,7 +116,7 @@ fn write_flight(folder: &Path, duration_ns: u64, points: u64) -> Result<(), Box<
         let ([x, y, z], q): ([f64; 3], _) = (pose.translation().into(), pose.rotation());
         let stamp = START_NS + ns;
         writeln!(poses, "{stamp},{x:.9},{y:.9},{z:.9},{:.12},{:.12},{:.12},{:.12}", q.w, q.i, q.j, q.k)?;
-        let mut noise = || numbers.between(-0.02, 0.02);
+        let mut noise = || numbers.uniform(-0.02, 0.02);
         let (x, y, z) = (x + noise(), y + noise(), z + noise());
         let (seconds, nanos) = (stamp / 1_000_000_000, stamp % 1_000_000_000);
         writeln!(
@@ -134,7 +135,7 @@ fn write_flight(folder: &Path, duration_ns: u64, points: u64) -> Result<(), Box<
 }
 
 fn write_labels(path: &Path, camera: &Camera, duration_ns: u64, points: u64) -> Result<(), Box<dyn Error>> {
-    let mut numbers = Numbers::new(5);
+    let mut numbers = Congruential::new(5);
     let mut places: Vec<Option<Point3<f64>>> = vec![None; points as usize];
     let mut labels = create(path)?;
     writeln!(labels, "point,timestamp_ns,u_px,v_px,keyframe")?;
@@ -148,7 +149,7 @@ fn write_labels(path: &Path, camera: &Camera, duration_ns: u64, points: u64) -> 
             let px = match seen {
                 Some(px) => px,
                 None => {
-                    let px = Pixel::new(numbers.between(100.0, 650.0), numbers.between(80.0, 400.0));
+                    let px = Pixel::new(numbers.uniform(100.0, 650.0), numbers.uniform(80.0, 400.0));
                     let ray = pose.rotate(&camera.unproject(px)?);
                     let eye = pose.translation();
                     *place = Some(Point3::from(eye - ray * (eye.z / ray.z)));

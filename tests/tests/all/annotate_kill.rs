@@ -5,20 +5,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use serde_json::{Value, json};
+use vice_core::random::SplitMix;
 
 use crate::annotate::{FRAMES, Run, is_readable, place};
 
 const KILLS: usize = 100;
-
-/// Numbers that look random and are the same in each run.
-struct Dice(u64);
-
-impl Dice {
-    fn below(&mut self, n: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % n
-    }
-}
 
 /// What was acknowledged last, and what was under way when the server died.
 struct Known {
@@ -32,9 +23,9 @@ struct Known {
 fn work(
     send: &dyn Fn(&str, &str) -> std::io::Result<crate::annotator::Answer>,
     mut known: Known,
-    mut dice: Dice,
+    mut dice: SplitMix,
     stop: &AtomicBool,
-) -> (Known, Dice) {
+) -> (Known, SplitMix) {
     while !stop.load(Ordering::Relaxed) {
         let point = dice.below(4).to_string();
         let frame = dice.below(FRAMES as u64) as usize;
@@ -72,7 +63,7 @@ fn work(
 #[test]
 fn annotate_survives_kill() {
     let run = Run::new();
-    let mut dice = Dice(20_260_101);
+    let mut dice = SplitMix::new(20_260_101);
     let mut known = Known { revision: 0, points: json!({}), under_way: None, acknowledged: 0 };
     let mut finished_after_all = 0;
     for kill in 0..=KILLS {

@@ -8,6 +8,7 @@ use serde_json::Value;
 use vice_core::camera::Pixel;
 use vice_core::dataset::{DatasetFactory, OpenOptions};
 use vice_core::label::{LabelSet, ObservationSource};
+use vice_core::statistics::{quantile, sorted};
 use vice_core::time::Stamp;
 use vice_detect::{BoardSize, DetectOptions, Detection, TagFamily, TagOptions, detect_labels};
 use vice_euroc::Euroc;
@@ -82,8 +83,8 @@ fn the_board_of_euroc_is_found_where_opencv_finds_it() {
         }
     }
     assert!(missed <= 1, "{missed} of 31 frames missed");
-    off.sort_by(f64::total_cmp);
-    let part = |p: f64| off[(p * (off.len() - 1) as f64) as usize];
+    let off = sorted(off);
+    let part = |p: f64| quantile(&off, p).unwrap();
     // This function of OpenCV's draws the outermost corners outwards (docs/detect.md): they are among the last twentieth.
     assert!(part(0.5) < 0.1 && part(0.95) < 0.3, "median {} px, 95 % {} px", part(0.5), part(0.95));
 
@@ -95,8 +96,7 @@ fn the_board_of_euroc_is_found_where_opencv_finds_it() {
         let corners = frames[&Stamp::parse_nanos(stamp).unwrap()].values();
         corners.map(|px| px.distance_px(Pixel::new(*u, *v))).fold(f64::MAX, f64::min)
     };
-    let mut off: Vec<f64> = refined.iter().map(nearest).collect();
-    off.sort_by(f64::total_cmp);
+    let off = sorted(refined.iter().map(nearest).collect());
     assert!(off[14] < 0.1 && off[27] < 0.3, "median {} px, most {} px", off[14], off[27]);
 
     // The corners that people labelled are the same ones in every frame.

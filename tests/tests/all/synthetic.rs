@@ -6,9 +6,8 @@ use nalgebra::Vector3;
 use vice_core::camera::Camera;
 use vice_core::dataset::{CloudSource, Dataset, DatasetFactory, OpenOptions, Probe};
 use vice_core::depth::DepthSource;
-use vice_core::evaluate::{Evaluation, Selection, Stream, Window, evaluate};
+use vice_core::evaluate::{DatasetRig, Evaluation, Selection, Stream, Window, evaluate};
 use vice_core::label::LabelSet;
-use vice_core::metrics::align::Alignment;
 use vice_core::result::{PixelPart, Role};
 use vice_core::time::Span;
 use vice_depth::{CloudOptions, FloorDepth, ZMapDepth, ZMapOptions, load_cloud};
@@ -40,22 +39,9 @@ fn score(synthetic: &Synthetic, camera: &Camera, labels: &LabelSet, zmap: bool) 
     } else {
         Box::new(FloorDepth::new())
     };
-    let evaluation = Evaluation {
-        dataset: synthetic,
-        camera_name: CAMERA,
-        camera,
-        frames: &frames,
-        selection: &selection,
-        streams: &streams,
-        anchor: 0,
-        own_anchors: false,
-        depths: &[source.as_ref()],
-        checks: &[],
-        max_gap: Span::from_millis(100),
-        subsets: None,
-        align: Alignment::Se3,
-        keep_samples: false,
-    };
+    let (rig, depths) = (DatasetRig::new(synthetic, CAMERA), [source.as_ref()]);
+    let evaluation =
+        Evaluation::builder(&rig, camera, &frames, &selection).streams(&streams).depths(&depths).build();
     evaluate(&evaluation, &|_, _| ()).unwrap().pixel
 }
 

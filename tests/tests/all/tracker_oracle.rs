@@ -12,8 +12,7 @@ use vice_tests::{root, shared};
 use vice_track::{DOUBT_CONFIDENCE, PointTrack, Pyramid, TrackOptions, track_translation};
 
 fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
+    vice_core::statistics::median(&mut values).unwrap()
 }
 
 /// Made by `oracles/klt.py`: 200 corners a pair of neighbouring frames and where `calcOpticalFlowPyrLK` finds them.

@@ -24,7 +24,6 @@ mod rational;
 mod solve;
 
 use nalgebra::{Point3, Vector3};
-use serde::{Deserialize, Serialize};
 
 use crate::lanes::Number;
 
@@ -37,8 +36,16 @@ pub use rational::Rational;
 pub const UNPROJECT_TOLERANCE: f64 = 1e-10;
 
 /// A place in the image, in pixels; pixel centres are integers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(from = "[f64; 2]", into = "[f64; 2]")]
+///
+/// ```
+/// use vice_core::camera::Pixel;
+///
+/// let (label, carried) = (Pixel::new(320.0, 240.0), Pixel::new(323.0, 244.0));
+/// assert_eq!(label.distance_px(carried), 5.0);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(from = "[f64; 2]", into = "[f64; 2]"))]
 pub struct Pixel {
     /// To the right.
     pub u: f64,
@@ -166,6 +173,21 @@ pub enum UnprojectError {
 }
 
 /// A calibrated camera: image size in pixels, intrinsics in pixels, and a lens.
+///
+/// ```
+/// use vice_core::camera::{Camera, Model, Pixel};
+/// use vice_core::nalgebra::Point3;
+///
+/// let lens = Model::from_name("radtan", &[-0.28, 0.07, 0.0002, 0.00002])?;
+/// let camera = Camera::new(752, 480, [458.0, 457.0, 367.0, 248.0], lens)?;
+/// // Metres in the camera's frame: x to the right, y down, z along the optical axis.
+/// let pixel = camera.project(&Point3::new(0.1, -0.2, 2.0))?;
+/// assert!(camera.contains(pixel));
+/// // Back to the ray (x, y, 1), which times the depth is the point.
+/// let ray = camera.unproject(pixel)?;
+/// assert!((ray * 2.0 - Point3::new(0.1, -0.2, 2.0).coords).norm() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     width: u32,

@@ -22,15 +22,14 @@ mod suspect;
 use std::fmt;
 use std::str::FromStr;
 
-use serde::{Deserialize, Serialize};
-
 pub use apply::{Given, cure};
 pub use axes::SignedAxes;
 pub use suspect::{Suspected, suspect};
 
 /// One discrete mistake: what the poses of a stream are, where they were read as something else.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "String", into = "String"))]
 #[non_exhaustive]
 pub enum Convention {
     /// Quaternions are written w first, and were read w last.

@@ -1,6 +1,7 @@
 //! Whether the depths of an image can be metres.
 
 use super::DepthImage;
+use crate::statistics::middle;
 use crate::suspicion::Suspicion;
 
 /// Middle depths beyond this are none of a depth camera's, metres: the farthest-reaching ones see some tens of metres.
@@ -16,12 +17,7 @@ const LOOKED_AT: usize = 4096;
 pub fn depth_unit_doubt(image: &DepthImage) -> Option<Suspicion> {
     let every = (image.z_m().len() / LOOKED_AT).max(1);
     let mut depths: Vec<f32> = image.z_m().iter().step_by(every).copied().filter(|z| !z.is_nan()).collect();
-    if depths.is_empty() {
-        return None;
-    }
-    let middle = depths.len() / 2;
-    let (_, z_m, _) = depths.select_nth_unstable_by(middle, f32::total_cmp);
-    let z_m = f64::from(*z_m);
+    let z_m = f64::from(middle(&mut depths, f32::total_cmp)?);
     let perhaps = match z_m {
         z if z > TOO_FAR_M => {
             let units = [("millimetres", z / 1000.0), ("centimetres", z / 100.0)];

@@ -6,6 +6,18 @@ use crate::error::{DataError, DataResult};
 use crate::frames::{Body, Rigid, World};
 
 /// The plane `n·p + d = 0` in frame `F`, `n` of unit length, `d` in metres.
+///
+/// ```
+/// use vice_core::dataset::{Floor, Plane};
+/// use vice_core::frames::World;
+///
+/// // A floor 5 cm below the origin of the world. Its normal need not be of unit length.
+/// let plane = Plane::<World>::new([0.0, 0.0, 2.0], 0.1)?;
+/// assert_eq!((plane.normal().z, plane.d_m()), (1.0, 0.05));
+/// let floor = Floor::World(plane);
+/// # assert!(matches!(floor, Floor::World(_)));
+/// # Ok::<(), vice_core::error::DataError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane<F> {
     normal: Unit<Vector3<f64>>,

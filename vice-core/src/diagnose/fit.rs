@@ -1,7 +1,7 @@
 //! A hypothesis fitted to the labels: a set of flaws, their values, the sizes of the noise, and how likely all of it is.
 
+use crate::parallel::*;
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::filter::{Jump, Shifts, Weights, Whitened, whiten};

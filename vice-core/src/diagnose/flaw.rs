@@ -58,6 +58,17 @@ pub struct ParameterInfo {
     pub plausible: f64,
     /// The width of what is expected of it before anything is seen, in that unit: one deviation.
     pub expected: f64,
+    /// The unit that people read it in.
+    pub unit: Unit,
+}
+
+/// A unit that a number is shown in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unit {
+    /// Its sign, empty for a plain number.
+    pub sign: &'static str,
+    /// How many of it the parameter's own unit is.
+    pub each: f64,
 }
 
 const fn parameter(
@@ -66,40 +77,51 @@ const fn parameter(
     step: f64,
     plausible: f64,
     expected: f64,
+    (sign, each): (&'static str, f64),
 ) -> ParameterInfo {
-    ParameterInfo { name, typical, step, plausible, expected }
+    ParameterInfo { name, typical, step, plausible, expected, unit: Unit { sign, each } }
 }
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
+const MS: (&str, f64) = ("ms", 1e3);
+const S: (&str, f64) = ("s", 1.0);
+const DEG: (&str, f64) = ("°", 1.0 / DEGREE);
+const DEG_S: (&str, f64) = ("°/s", 1.0 / DEGREE);
+const MM: (&str, f64) = ("mm", 1e3);
+const MM_S: (&str, f64) = ("mm/s", 1e3);
+const PERCENT: (&str, f64) = ("%", 1e2);
+const PPM: (&str, f64) = ("ppm", 1e6);
+const PX: (&str, f64) = ("px", 1.0);
+const PLAIN: (&str, f64) = ("", 1.0);
 
 /// The parameters in the order of a [`super::Theta`].
 pub const PARAMETERS: [ParameterInfo; PARAMETER_COUNT] = [
-    parameter("offset_s", 0.01, 0.002, 1.5, 0.03),
-    parameter("rotation_x_rad", DEGREE, 5e-4, 0.35, 1.2 * DEGREE),
-    parameter("rotation_y_rad", DEGREE, 5e-4, 0.35, 1.2 * DEGREE),
-    parameter("rotation_z_rad", DEGREE, 5e-4, 0.35, 1.2 * DEGREE),
-    parameter("translation_x_m", 0.01, 1e-3, 0.5, 0.04),
-    parameter("translation_y_m", 0.01, 1e-3, 0.5, 0.04),
-    parameter("translation_z_m", 0.01, 1e-3, 0.5, 0.04),
-    parameter("focal_share", 0.01, 5e-4, 0.3, 0.025),
-    parameter("principal_u_px", 5.0, 0.25, 80.0, 7.0),
-    parameter("principal_v_px", 5.0, 0.25, 80.0, 7.0),
-    parameter("tilt_x_rad", 0.5 * DEGREE, 1e-5, 0.2, 0.6 * DEGREE),
-    parameter("tilt_y_rad", 0.5 * DEGREE, 1e-5, 0.2, 0.6 * DEGREE),
-    parameter("scale_share", 0.02, 5e-4, 0.6, 0.04),
-    parameter("drift_x_m_s", 0.02, 5e-4, 0.5, 0.03),
-    parameter("drift_y_m_s", 0.02, 5e-4, 0.5, 0.03),
-    parameter("drift_z_m_s", 0.02, 5e-4, 0.5, 0.03),
-    parameter("yaw_drift_rad_s", 0.2 * DEGREE, 5e-5, 0.1, 0.25 * DEGREE),
-    parameter("k1", 0.02, 1e-3, 3.0, 0.08),
-    parameter("k2", 0.02, 1e-3, 6.0, 0.06),
-    parameter("p1", 0.001, 1e-4, 0.05, 0.002),
-    parameter("p2", 0.001, 1e-4, 0.05, 0.002),
-    parameter("aspect_share", 0.01, 5e-4, 0.3, 0.02),
-    parameter("rate_share", 5e-4, 5e-5, 0.7, 0.002),
-    parameter("step_s", 0.05, 0.002, 1.5, 0.08),
-    parameter("step_at_s", 1.0, 0.02, 1e9, 1e9),
-    parameter("readout_s", 0.01, 5e-4, 0.2, 0.015),
+    parameter("offset_s", 0.01, 0.002, 1.5, 0.03, MS),
+    parameter("rotation_x_rad", DEGREE, 5e-4, 0.35, 1.2 * DEGREE, DEG),
+    parameter("rotation_y_rad", DEGREE, 5e-4, 0.35, 1.2 * DEGREE, DEG),
+    parameter("rotation_z_rad", DEGREE, 5e-4, 0.35, 1.2 * DEGREE, DEG),
+    parameter("translation_x_m", 0.01, 1e-3, 0.5, 0.04, MM),
+    parameter("translation_y_m", 0.01, 1e-3, 0.5, 0.04, MM),
+    parameter("translation_z_m", 0.01, 1e-3, 0.5, 0.04, MM),
+    parameter("focal_share", 0.01, 5e-4, 0.3, 0.025, PERCENT),
+    parameter("principal_u_px", 5.0, 0.25, 80.0, 7.0, PX),
+    parameter("principal_v_px", 5.0, 0.25, 80.0, 7.0, PX),
+    parameter("tilt_x_rad", 0.5 * DEGREE, 1e-5, 0.2, 0.6 * DEGREE, DEG),
+    parameter("tilt_y_rad", 0.5 * DEGREE, 1e-5, 0.2, 0.6 * DEGREE, DEG),
+    parameter("scale_share", 0.02, 5e-4, 0.6, 0.04, PERCENT),
+    parameter("drift_x_m_s", 0.02, 5e-4, 0.5, 0.03, MM_S),
+    parameter("drift_y_m_s", 0.02, 5e-4, 0.5, 0.03, MM_S),
+    parameter("drift_z_m_s", 0.02, 5e-4, 0.5, 0.03, MM_S),
+    parameter("yaw_drift_rad_s", 0.2 * DEGREE, 5e-5, 0.1, 0.25 * DEGREE, DEG_S),
+    parameter("k1", 0.02, 1e-3, 3.0, 0.08, PLAIN),
+    parameter("k2", 0.02, 1e-3, 6.0, 0.06, PLAIN),
+    parameter("p1", 0.001, 1e-4, 0.05, 0.002, PLAIN),
+    parameter("p2", 0.001, 1e-4, 0.05, 0.002, PLAIN),
+    parameter("aspect_share", 0.01, 5e-4, 0.3, 0.02, PERCENT),
+    parameter("rate_share", 5e-4, 5e-5, 0.7, 0.002, PPM),
+    parameter("step_s", 0.05, 0.002, 1.5, 0.08, MS),
+    parameter("step_at_s", 1.0, 0.02, 1e9, 1e9, S),
+    parameter("readout_s", 0.01, 5e-4, 0.2, 0.015, MS),
 ];
 
 impl Flaw {

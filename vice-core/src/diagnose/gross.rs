@@ -1,6 +1,6 @@
 //! Gross errors first: another convention of the whole stream, before any small flaw is fitted.
 
-use rayon::prelude::*;
+use crate::parallel::*;
 
 use super::DiagnoseError;
 use super::motion::{Motion, Poses};
@@ -11,6 +11,7 @@ use crate::conventions::{Convention, Given, cure};
 use crate::error::DataResult;
 use crate::evaluate::Evaluation;
 use crate::frames::rotation_angle_rad;
+use crate::statistics::middle;
 use crate::time::Stamp;
 use crate::trajectory::Trajectory;
 
@@ -50,7 +51,7 @@ pub(super) fn hypotheses(
     scene: &Scene<'_>,
     trajectory: &Trajectory,
 ) -> Result<Vec<Hypothesis>, DiagnoseError> {
-    let at = |stamp: Stamp| evaluation.dataset.body_from_camera(evaluation.camera_name, stamp).ok();
+    let at = |stamp: Stamp| evaluation.rig.body_from_camera(stamp).ok();
     let given = Given { body_from_camera: Some(&at), first_frame: Some(scene.first_frame) };
     let mut lists: Vec<Vec<Convention>> = vec![vec![]];
     lists.extend(Convention::TRIED.iter().map(|c| vec![*c]));
@@ -112,8 +113,9 @@ fn unusual(scene: &Scene<'_>, trajectory: &Trajectory) -> f64 {
         if speed > SPEED_M_S { beyond(speed, SPEED_M_S) } else { beyond(speed.max(0.02), SPEED_M_S) };
     if scene.own_anchor {
         let mut heights: Vec<f64> = trajectory.poses().iter().map(|p| p.translation().z.abs()).collect();
-        heights.sort_by(f64::total_cmp);
-        sum += beyond(heights[heights.len() / 2].max(0.02), HEIGHT_M);
+        if let Some(height) = middle(&mut heights, f64::total_cmp) {
+            sum += beyond(height.max(0.02), HEIGHT_M);
+        }
     }
     sum
 }

@@ -40,7 +40,7 @@ pub use document::{
     CauseName, DiagnosisDocument, Estimated, FlawPart, HypothesisPart, LabelsPart, OdometryPart, Overlap,
     SCHEMA, Verdict, VerdictKind,
 };
-pub use flaw::{Flaw, PARAMETER_COUNT, PARAMETERS, ParameterInfo};
+pub use flaw::{Flaw, PARAMETER_COUNT, PARAMETERS, ParameterInfo, Unit};
 pub use mend::mend;
 pub use motion::InertialRun;
 pub use noise::OdometryNoise;

@@ -12,6 +12,7 @@ use super::theta::Theta;
 use crate::error::{DataError, DataResult};
 use crate::frames::{Rigid, WorldFromBody, rotation_vector_rad};
 use crate::imu::{ImuSample, InertialState, integrate_euler};
+use crate::statistics::middle;
 use crate::time::{Span, Stamp};
 use crate::trajectory::{Trajectory, interpolate};
 
@@ -103,8 +104,7 @@ impl Poses {
     pub(super) fn smoothed(&self) -> Self {
         let n = self.times_s.len();
         let mut steps: Vec<f64> = self.times_s.windows(2).map(|w| w[1] - w[0]).collect();
-        steps.sort_by(f64::total_cmp);
-        let Some(period) = steps.get(steps.len() / 2).copied().filter(|p| *p < SLOW_S && n > 8) else {
+        let Some(period) = middle(&mut steps, f64::total_cmp).filter(|p| *p < SLOW_S && n > 8) else {
             return self.clone();
         };
         let half = HALF_WIDTH_S.max(HALF_WIDTH_POSES * period);

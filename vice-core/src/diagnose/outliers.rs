@@ -6,6 +6,7 @@ use super::filter::{Shifts, Weights, whiten};
 use super::fit::{Fit, Work, expected_of};
 use super::normal::Normal;
 use super::scene::{Residual, Scene};
+use crate::statistics::middle;
 
 /// Variance of an outlier over that of a usual label.
 const RAISED: f64 = 400.0;
@@ -28,9 +29,8 @@ fn labels(scene: &Scene<'_>, residuals: &[Residual]) -> Vec<bool> {
         .iter()
         .flat_map(|labels| (0..labels.len()).filter_map(|i| deviation(scene, residuals, labels, i)))
         .collect();
-    usual.sort_by(f64::total_cmp);
     // Half of the lengths of a normal distribution in the plane are below 1.18 deviations.
-    let Some(median) = usual.get(usual.len() / 2) else { return outliers };
+    let Some(median) = middle(&mut usual, f64::total_cmp) else { return outliers };
     let sigma = (median / 1.1774).max(LEAST_PX);
     for mut labels in all {
         let most = labels.len().div_ceil(5);
@@ -96,10 +96,8 @@ fn raise(work: &Work<'_, '_>, fit: &Fit, weights: &mut Weights, shifts: Shifts, 
         Shifts::Labels => (&mut weights.labels, FAR_LABEL),
         _ => (&mut weights.keys, FAR_KEY),
     };
-    let mut sorted: Vec<f64> = scores.clone();
-    sorted.sort_by(f64::total_cmp);
     // The median of chi-square with two degrees of freedom is 1.39.
-    let high = (sorted.get(sorted.len() / 2).copied().unwrap_or(0.0) / 1.39).max(1.0);
+    let high = (middle(&mut scores.clone(), f64::total_cmp).unwrap_or(0.0) / 1.39).max(1.0);
     let found = own.iter().filter(|w| **w > 1.0).count();
     let mut worst: Vec<(f64, usize)> = scores
         .iter()

@@ -40,9 +40,9 @@ pub(super) fn diagnosed(
     let document = DiagnosisDocument {
         schema: SCHEMA.to_string(),
         vice_version: env!("CARGO_PKG_VERSION").to_string(),
-        dataset: evaluation.dataset.name().to_string(),
-        format: evaluation.dataset.format().to_string(),
-        camera: evaluation.camera_name.to_string(),
+        dataset: evaluation.rig.name().to_string(),
+        format: evaluation.rig.format().to_string(),
+        camera: evaluation.rig.camera_name().to_string(),
         stream: evaluation.streams[diagnosis.stream].name.clone(),
         depth: evaluation.depths[diagnosis.depth].name().to_string(),
         labels: labels_part(prepared, work),

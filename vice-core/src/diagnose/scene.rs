@@ -6,8 +6,8 @@
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use crate::parallel::*;
 use nalgebra::Vector2;
-use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::flaw::{Flaw, PARAMETERS};
@@ -119,7 +119,7 @@ impl<'a> Scene<'a> {
                 }
             }
             if labels.len() > from {
-                frames[frame].floor = evaluation.dataset.floor(frames[frame].stamp).ok();
+                frames[frame].floor = evaluation.rig.floor(frames[frame].stamp).ok();
                 let point = names.len() - 1;
                 segments.push(Segment { point, frame, px: keyframe.keyframe.px, labels: from..labels.len() });
             }

@@ -1,6 +1,6 @@
 //! All hypotheses: none, each flaw, pairs; fitted to the same labels with the same outliers, by their evidence.
 
-use rayon::prelude::*;
+use crate::parallel::*;
 
 use super::DiagnoseError;
 use super::filter::Weights;
@@ -224,7 +224,8 @@ fn same_sizes(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
 /// With their own sizes, those that are close.
 fn sized(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
     let best = best_of(&fits);
-    let first = work.sized(fits[best].clone(), 2);
+    // To the end: a pair that starts from here must not win by better sizes.
+    let first = work.sized(fits[best].clone(), 5);
     let limit = first.score - CLOSE;
     let mut fits: Vec<Fit> = fits
         .into_par_iter()
@@ -326,7 +327,7 @@ fn pairs(
     order.sort_by(|a, b| fits[*b].score.total_cmp(&fits[*a].score));
     order.truncate(3);
     let mut looked: Vec<(f64, Start)> =
-        order.into_par_iter().flat_map_iter(|i| second_flaws(work, &fits[i], flaws).into_iter()).collect();
+        order.into_par_iter().flat_map(|i| second_flaws(work, &fits[i], flaws)).collect();
     looked.sort_by(|a, b| b.0.total_cmp(&a.0));
     let most = looked.first().map_or_else(|| best_score(fits), |l| l.0.max(best_score(fits)));
     let close = looked.into_iter().filter(|l| l.0 > most - CLOSE_PAIR).map(|l| l.1).take(2 * most_pairs);

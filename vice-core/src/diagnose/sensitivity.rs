@@ -116,8 +116,8 @@ pub fn sensitivity(
     Ok(SensitivityDocument {
         schema: SENSITIVITY_SCHEMA.to_string(),
         vice_version: env!("CARGO_PKG_VERSION").to_string(),
-        dataset: evaluation.dataset.name().to_string(),
-        camera: evaluation.camera_name.to_string(),
+        dataset: evaluation.rig.name().to_string(),
+        camera: evaluation.rig.camera_name().to_string(),
         stream: evaluation.streams[stream].name.clone(),
         depth: evaluation.depths[depth].name().to_string(),
         labels,

@@ -1,63 +1,65 @@
 //! Flaws and verdicts in words.
 
 use super::document::Estimated;
-use super::flaw::Flaw;
+use super::flaw::{Flaw, PARAMETERS, Unit};
 
 /// `clock offset: +50.3 ms [49.1, 51.6]`.
 pub(super) fn line(flaw: Flaw, parameters: &[Estimated], size: Option<&Estimated>) -> String {
     let numbers = match (flaw, parameters, size) {
-        (Flaw::ClockOffset, [offset], _) => number(offset, 1e3, "ms", true),
-        (Flaw::FocalLength | Flaw::Scale | Flaw::Aspect, [share], _) => number(share, 1e2, "%", true),
-        (Flaw::ClockRate, [share], _) => number(share, 1e6, "ppm", true),
-        (Flaw::RollingShutter, [time], _) => number(time, 1e3, "ms", true),
         (Flaw::ClockStep, [step, at], _) => {
-            format!("{} from {} on", number(step, 1e3, "ms", true), number(at, 1.0, "s", false))
-        }
-        (Flaw::ExtrinsicRotation, [x, y, z], Some(size)) => {
-            format!("{} ({})", number(size, DEGREES, "°", false), axes(&[x, y, z], DEGREES, "°"))
-        }
-        (Flaw::ExtrinsicTranslation, [x, y, z], Some(size)) => {
-            format!("{} ({})", number(size, 1e3, "mm", false), axes(&[x, y, z], 1e3, "mm"))
-        }
-        (Flaw::InitialTilt, [x, y], Some(size)) => {
-            format!("{} ({})", number(size, DEGREES, "°", false), axes(&[x, y], DEGREES, "°"))
+            format!("{} from {} on", number(step, unit(step), true), number(at, unit(at), false))
         }
         (Flaw::PrincipalPoint, [u, v], _) => {
-            format!("u {}, v {}", number(u, 1.0, "px", true), number(v, 1.0, "px", true))
+            format!("u {}, v {}", number(u, unit(u), true), number(v, unit(v), true))
         }
         (Flaw::Drift, [x, y, z, yaw], Some(size)) => format!(
             "{} ({}), yaw {}",
-            number(size, 1e3, "mm/s", false),
-            axes(&[x, y, z], 1e3, "mm/s"),
-            number(yaw, DEGREES, "°/s", true)
+            number(size, unit(x), false),
+            axes(&[x, y, z]),
+            number(yaw, unit(yaw), true)
         ),
+        (_, [x, ..], Some(size)) => {
+            format!("{} ({})", number(size, unit(x), false), axes(&parameters.iter().collect::<Vec<_>>()))
+        }
         (_, parameters, _) => {
-            parameters.iter().map(|p| number(p, 1.0, &p.name, true)).collect::<Vec<_>>().join(", ")
+            // A plain number goes by its name.
+            let own = |p: &Estimated| match unit(p) {
+                Unit { sign: "", each } => number(p, Unit { sign: name_of(p), each }, true),
+                unit => number(p, unit, true),
+            };
+            parameters.iter().map(own).collect::<Vec<_>>().join(", ")
         }
     };
     format!("{}: {numbers}", flaw.words())
 }
 
-const DEGREES: f64 = 180.0 / std::f64::consts::PI;
-
-fn number(e: &Estimated, scale: f64, unit: &str, signed: bool) -> String {
-    let (value, low, high) = (e.value * scale, e.low * scale, e.high * scale);
-    let decimals = decimals(high - low);
-    let space = if unit.starts_with('°') { "" } else { " " };
-    let value = if signed { format!("{value:+.decimals$}") } else { format!("{value:.decimals$}") };
-    format!("{value}{space}{unit} [{low:.decimals$}, {high:.decimals$}]")
+fn unit(of: &Estimated) -> Unit {
+    PARAMETERS.iter().find(|p| p.name == of.name).map_or(Unit { sign: "", each: 1.0 }, |p| p.unit)
 }
 
-fn axes(parameters: &[&Estimated], scale: f64, unit: &str) -> String {
-    let widest = parameters.iter().map(|p| (p.high - p.low) * scale).fold(f64::INFINITY, f64::min);
-    let decimals = decimals(widest);
+fn name_of(of: &Estimated) -> &'static str {
+    PARAMETERS.iter().find(|p| p.name == of.name).map_or("", |p| p.name)
+}
+
+fn number(e: &Estimated, Unit { sign, each }: Unit, signed: bool) -> String {
+    let (value, low, high) = (e.value * each, e.low * each, e.high * each);
+    let decimals = decimals(high - low);
+    let space = if sign.starts_with('°') { "" } else { " " };
+    let value = if signed { format!("{value:+.decimals$}") } else { format!("{value:.decimals$}") };
+    format!("{value}{space}{sign} [{low:.decimals$}, {high:.decimals$}]")
+}
+
+fn axes(parameters: &[&Estimated]) -> String {
+    let Unit { sign, each } = parameters.first().map_or(Unit { sign: "", each: 1.0 }, |p| unit(p));
+    let narrowest = parameters.iter().map(|p| (p.high - p.low) * each).fold(f64::INFINITY, f64::min);
+    let decimals = decimals(narrowest);
     let axes: Vec<String> = ["x", "y", "z"]
         .iter()
         .zip(parameters)
-        .map(|(name, p)| format!("{name} {:+.decimals$}", p.value * scale))
+        .map(|(name, p)| format!("{name} {:+.decimals$}", p.value * each))
         .collect();
-    let space = if unit.starts_with('°') { "" } else { " " };
-    format!("{}{space}{unit}", axes.join(", "))
+    let space = if sign.starts_with('°') { "" } else { " " };
+    format!("{}{space}{sign}", axes.join(", "))
 }
 
 /// An interval of exact data has no width worth the digits.

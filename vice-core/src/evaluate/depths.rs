@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
+use crate::parallel::*;
 
 use super::streams::PosesAtFrames;
 use super::{EvaluateError, Evaluation, position};
@@ -38,7 +38,7 @@ impl<'a> SourceDepths<'a> {
         placing: &[&PosesAtFrames],
     ) -> Result<Self, EvaluateError> {
         let alike = match evaluation.selection.first_keyframe() {
-            Some(stamp) => !source.needs_world(&evaluation.dataset.floor(stamp)?),
+            Some(stamp) => !source.needs_world(&evaluation.rig.floor(stamp)?),
             None => true,
         };
         let asked = if alike { &placing[..placing.len().min(1)] } else { placing };
@@ -85,7 +85,7 @@ pub(super) fn keyframe_depths(
                 camera: evaluation.camera,
                 body_from_camera,
                 world_from_camera: anchor[at].ok().map(|pose| pose * body_from_camera),
-                floor: evaluation.dataset.floor(stamp)?,
+                floor: evaluation.rig.floor(stamp)?,
             };
             let list: Vec<Pixel> = pixels.values().copied().collect();
             let depths = source.depths(&keyframe, &list)?;

@@ -12,15 +12,20 @@
 mod curves;
 mod depth_doubts;
 mod depths;
+mod input;
 mod path_doubts;
+mod rig;
 mod score;
 mod select;
 mod since;
 mod sparse;
 mod spread;
 mod streams;
+#[cfg(feature = "serde")]
 pub(crate) mod trial;
 
+pub use input::{DEFAULT_MAX_GAP, Evaluation, EvaluationBuilder};
+pub use rig::{DatasetRig, FixedRig, Rig};
 pub use select::{Observations, SelectedKeyframe, Selection, Window};
 pub use streams::Stream;
 
@@ -29,17 +34,13 @@ use depths::{DepthTable, SourceDepths, pixel_key};
 use score::Scorer;
 use streams::PosesAtFrames;
 
-use crate::camera::Camera;
-use crate::dataset::Dataset;
-use crate::depth::DepthSource;
 use crate::error::{DataError, DataResult};
 use crate::frames::BodyFromCamera;
-use crate::metrics::align::Alignment;
 use crate::metrics::pixel::{pooled_rmse_px, subset_rmse_px};
 use crate::result::{DatasetPart, Evaluated, PixelPart, PointName, Role, Sample, Skip};
 use crate::skip::SkipReason;
 use crate::suspicion::Suspicions;
-use crate::time::{Span, Stamp};
+use crate::time::Stamp;
 
 /// Why nothing could be evaluated.
 #[derive(Debug, thiserror::Error)]
@@ -123,46 +124,6 @@ pub enum EvaluateError {
     /// The data set could not be read.
     #[error(transparent)]
     Data(#[from] DataError),
-}
-
-/// What is evaluated, and how.
-pub struct Evaluation<'a> {
-    /// The data set; what a user overrides of it is a [`Calibrated`](crate::dataset::Calibrated) around it.
-    pub dataset: &'a dyn Dataset,
-    /// Name of its camera.
-    pub camera_name: &'a str,
-    /// The camera's intrinsics.
-    pub camera: &'a Camera,
-    /// The camera's frames.
-    pub frames: &'a [Stamp],
-    /// What takes part.
-    pub selection: &'a Selection<'a>,
-    /// The pose streams, the reference first where there is one.
-    pub streams: &'a [Stream],
-    /// Index of the stream that places the camera for depth.
-    pub anchor: usize,
-    /// Each stream places the camera for its own depth: without a reference none of them is better known than the
-    /// others, and the order in which they are listed must not matter.
-    pub own_anchors: bool,
-    /// The depth sources.
-    pub depths: &'a [&'a dyn DepthSource],
-    /// Further sources, which nothing is scored with: their depths at the key frames are compared.
-    pub checks: &'a [&'a dyn DepthSource],
-    /// Widest gap between two poses that is interpolated.
-    pub max_gap: Span,
-    /// Subset sizes; `None` for those up to 3 that exist.
-    pub subsets: Option<&'a [usize]>,
-    /// Alignment of the trajectory errors.
-    pub align: Alignment,
-    /// Whether the document lists the scored samples.
-    pub keep_samples: bool,
-}
-
-impl Evaluation<'_> {
-    /// Index of the stream that places the camera for the depth of a stream.
-    pub const fn anchor_of(&self, stream: usize) -> usize {
-        if self.own_anchors { stream } else { self.anchor }
-    }
 }
 
 /// Takes the scored samples of one point, of the pose stream and depth source that are named.
@@ -307,9 +268,9 @@ fn run(
     let (trajectory, paths) = curves::trajectories(evaluation, &poses, &mut suspicions);
     Ok(Evaluated {
         dataset: DatasetPart {
-            name: evaluation.dataset.name().to_string(),
-            format: evaluation.dataset.format().to_string(),
-            camera: evaluation.camera_name.to_string(),
+            name: evaluation.rig.name().to_string(),
+            format: evaluation.rig.format().to_string(),
+            camera: evaluation.rig.camera_name().to_string(),
             image_size_px: Some([evaluation.camera.width(), evaluation.camera.height()]),
             first_frame_ns: evaluation.frames.first().copied(),
         },
@@ -322,7 +283,7 @@ fn run(
 
 /// What looked wrong in the data, the depth sources and the pose streams, each said once. Asked when all was read.
 fn all_suspicions(evaluation: &Evaluation<'_>, found: Suspicions) -> Suspicions {
-    let mut list: Suspicions = evaluation.dataset.suspicions().into_iter().collect();
+    let mut list: Suspicions = evaluation.rig.suspicions().into_iter().collect();
     list.extend(evaluation.depths.iter().flat_map(|source| source.suspicions()));
     list.extend(evaluation.streams.iter().filter_map(|stream| {
         sparse::suspicion(stream, evaluation.selection, evaluation.frames, evaluation.max_gap)
@@ -352,7 +313,7 @@ fn extrinsics(evaluation: &Evaluation<'_>) -> DataResult<Vec<Option<BodyFromCame
     let mut first_error = None;
     let mut found = Vec::with_capacity(evaluation.selection.frames.len());
     for frame in &evaluation.selection.frames {
-        match evaluation.dataset.body_from_camera(evaluation.camera_name, evaluation.frames[*frame]) {
+        match evaluation.rig.body_from_camera(evaluation.frames[*frame]) {
             Ok(body_from_camera) => found.push(Some(body_from_camera)),
             Err(error) => {
                 first_error.get_or_insert(error);

@@ -1,7 +1,7 @@
 //! Tracking and scoring of the labels of one pose stream with one depth source.
 
+use crate::parallel::*;
 use nalgebra::Point3;
-use rayon::prelude::*;
 
 use super::select::{Matched, SelectedPoint, SelectedSegment};
 use super::streams::PosesAtFrames;

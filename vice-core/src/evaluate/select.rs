@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
-
 use super::{EvaluateError, SkipReason};
 use crate::camera::Camera;
 use crate::label::{LabelSet, Observation, ObservationSource};
@@ -24,8 +22,9 @@ pub struct Window {
 }
 
 /// Whose labels count.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Observations {
     /// Those that whoever made them is sure of. A segment whose key frame is flagged as uncertain is left out as a

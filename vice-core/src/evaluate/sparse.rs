@@ -1,6 +1,7 @@
 //! A pose stream with poses too far apart to be interpolated, such as the key frames of a SLAM system.
 
 use super::{Selection, Stream};
+use crate::statistics::middle;
 use crate::suspicion::Suspicion;
 use crate::time::{Span, Stamp};
 use crate::trajectory::{NoPose, Trajectory};
@@ -24,8 +25,7 @@ pub(super) fn suspicion(
     }
     let spacing = trajectory.median_spacing()?;
     let mut away: Vec<Span> = in_gaps.iter().map(|stamp| distance(trajectory, *stamp)).collect();
-    let middle = away.len() / 2;
-    let away = *away.select_nth_unstable(middle).1;
+    let away = middle(&mut away, Ord::cmp)?;
     let wide = spacing.max(max_gap);
     Some(
         Suspicion::new("sparse-poses", &stream.name, "the poses are too far apart to be interpolated")

@@ -4,9 +4,10 @@ use super::Evaluation;
 use super::score::Scored;
 use crate::frames::BodyFromCamera;
 use crate::metrics::by_age::{AGES_S, Errors, MOTIONS_M, errors, errors_at};
-use crate::metrics::held::{Aside, CarriedSegment, median, set_aside};
+use crate::metrics::held::{Aside, CarriedSegment, set_aside};
 use crate::metrics::interval::{Estimated, FEWEST_SEGMENTS};
 use crate::result::{AsideReason, Figure, HeldPart, PointName, SetAside, WindowPart};
+use crate::statistics::median;
 use crate::suspicion::Suspicion;
 use crate::time::Stamp;
 

@@ -3,10 +3,8 @@
 use super::depths::keyframe_depths;
 use super::score::{Scorer, score};
 use super::{EvaluateError, Evaluation, extrinsics};
-use crate::camera::Camera;
 use crate::error::DataResult;
 use crate::frames::BodyFromCamera;
-use crate::metrics::align::Alignment;
 use crate::metrics::pixel::pooled_rmse_px;
 
 /// Extrinsics at the selected frames.
@@ -37,12 +35,11 @@ impl<'a> Trial<'a> {
         let e = self.evaluation;
         let at = |stream: usize| e.streams[stream].poses_at(e.frames, &e.selection.frames, e.max_gap);
         let cameras = self.cameras()?;
-        let evaluation = self.with(e.camera);
-        let depths = keyframe_depths(&evaluation, e.depths[depth], &cameras, &at(e.anchor_of(stream)))?;
+        let depths = keyframe_depths(e, e.depths[depth], &cameras, &at(e.anchor_of(stream)))?;
         // Only a sink can fail, and there is none.
         let poses = &at(stream);
         let scorer = Scorer {
-            evaluation: &evaluation,
+            evaluation: e,
             cameras: &cameras,
             poses,
             depths: &depths,
@@ -51,25 +48,5 @@ impl<'a> Trial<'a> {
         };
         let errors = score(&scorer, None).map_or_else(|_| Vec::new(), |all| all.errors);
         Ok((pooled_rmse_px(&errors).unwrap_or(0.0), errors.iter().map(|e| e.count as usize).sum()))
-    }
-
-    fn with<'b>(&'b self, camera: &'b Camera) -> Evaluation<'b> {
-        let e = self.evaluation;
-        Evaluation {
-            dataset: e.dataset,
-            camera_name: e.camera_name,
-            camera,
-            frames: e.frames,
-            selection: e.selection,
-            streams: e.streams,
-            anchor: e.anchor,
-            own_anchors: e.own_anchors,
-            depths: e.depths,
-            checks: &[],
-            max_gap: e.max_gap,
-            subsets: None,
-            align: Alignment::None,
-            keep_samples: false,
-        }
     }
 }

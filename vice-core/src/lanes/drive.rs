@@ -52,7 +52,7 @@ pub(crate) fn run<T: Element, K: Kernel<IN, OUT>, const IN: usize, const OUT: us
         && valid.as_ref().is_none_or(|v| v.len() == n);
     assert!(same_length, "{name}: slices differ in length");
     let drive = Drive { kernel, input, inout, valid };
-    if n >= PARALLEL_POINTS && rayon::current_num_threads() > 1 {
+    if n >= PARALLEL_POINTS && crate::parallel::current_num_threads() > 1 {
         drive.in_parallel()
     } else {
         ARCH.dispatch(drive)
@@ -74,7 +74,7 @@ impl<T: Element, K: Kernel<IN, OUT>, const IN: usize, const OUT: usize> Drive<'_
             return ARCH.dispatch(self);
         }
         let (a, b) = self.split_at((n / 2).next_multiple_of(CACHE_LINE));
-        let (a, b) = rayon::join(|| a.in_parallel(), || b.in_parallel());
+        let (a, b) = crate::parallel::join(|| a.in_parallel(), || b.in_parallel());
         a + b
     }
 

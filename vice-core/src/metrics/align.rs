@@ -7,15 +7,15 @@
 use std::str::FromStr;
 
 use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
 
 use crate::error::{DataError, DataResult};
 use crate::frames::{Rigid, WorldFromBody};
 use crate::metrics::associate::PosePairs;
 
 /// What may be moved before trajectories are compared.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum Alignment {
     /// Nothing: the two already share a world frame.
     None,

@@ -14,6 +14,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::statistics::median;
+
 /// Median of the length of a vector of two Gaussian components of deviation one.
 const MEDIAN_LENGTH: f64 = 1.1774;
 /// A label is off from so many deviations on.
@@ -191,29 +193,12 @@ fn median_residual(samples: &[Carried]) -> [f64; 2] {
         let mut values = [0.0; 5];
         let values = &mut values[..samples.len()];
         values.iter_mut().zip(samples).for_each(|(v, s)| *v = s.residual_px[axis]);
-        values.sort_by(f64::total_cmp);
-        let middle = values.len() / 2;
-        if values.len() % 2 == 1 { values[middle] } else { f64::midpoint(values[middle - 1], values[middle]) }
+        median(values).unwrap_or(0.0)
     })
 }
 
 fn length(v: [f64; 2]) -> f64 {
     v[0].hypot(v[1])
-}
-
-/// The median; `None` of nothing. Changes the order.
-pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    let middle = values.len() / 2;
-    let even = values.len().is_multiple_of(2);
-    let (below, &mut upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
-    Some(if even {
-        f64::midpoint(below.iter().copied().fold(f64::NEG_INFINITY, f64::max), upper)
-    } else {
-        upper
-    })
 }
 
 #[cfg(test)]
@@ -295,7 +280,5 @@ mod tests {
         let found = set_aside(&[exact(0, 0, 2), exact(0, 3, 1), exact(1, 0, 9), exact(2, 0, 0)]);
         assert!(found.iter().all(|a| *a == Aside::default()));
         assert!(set_aside(&[]).is_empty());
-        assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), Some(2.5));
-        assert_eq!(median(&mut []), None);
     }
 }

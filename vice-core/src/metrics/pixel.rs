@@ -7,8 +7,6 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
-
 use crate::random::SplitMix;
 
 /// Above this many subsets a seeded sample of [`SAMPLED_SUBSETS`] of them is taken.
@@ -26,7 +24,8 @@ pub struct SquaredErrors {
 }
 
 /// RMSE_2D over the subsets of one size.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SubsetRmse {
     /// Mean over the subsets, pixels.
     pub mean: f64,
@@ -35,7 +34,7 @@ pub struct SubsetRmse {
     /// How many subsets there are, or were sampled.
     pub subsets: u64,
     /// Whether the subsets are a seeded sample of all.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "std::ops::Not::not"))]
     pub sampled: bool,
 }
 
@@ -73,7 +72,7 @@ fn subsets_of_size(points: &[SquaredErrors], size: usize) -> Option<SubsetRmse> 
     let mut sums = Moments::default();
     let sampled = total > MAX_SUBSETS;
     if sampled {
-        let mut random = SplitMix(size as u64);
+        let mut random = SplitMix::new(size as u64);
         let mut order: Vec<usize> = (0..points.len()).collect();
         for _ in 0..SAMPLED_SUBSETS {
             // The first `size` places of a partial Fisher-Yates shuffle are a uniform subset.

@@ -3,15 +3,15 @@
 use std::str::FromStr;
 
 use nalgebra::{UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
 
 use crate::error::{DataError, DataResult};
 use crate::frames::{Rigid, WorldFromBody};
 use crate::metrics::associate::PosePairs;
 
 /// A coordinate plane of the world.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
 pub enum Plane {
     /// The horizontal plane: z goes.
     Xy,

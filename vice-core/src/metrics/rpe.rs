@@ -5,8 +5,6 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::{Deserialize, Serialize};
-
 use crate::error::{DataError, DataResult};
 use crate::frames::rotation_angle_rad;
 use crate::metrics::associate::PosePairs;
@@ -22,8 +20,9 @@ pub const MAX_PAIRS: usize = 1 << 24;
 pub const ALL_PAIRS_TOLERANCE: f64 = 0.1;
 
 /// What the stretch between two poses is measured in.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
 pub enum DeltaUnit {
     /// Number of paired poses.
     #[default]
@@ -153,7 +152,8 @@ pub struct RpeErrors {
 }
 
 /// Statistics of the relative pose error.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Rpe {
     /// How many pairs of poses there were.
     pub pairs: usize,

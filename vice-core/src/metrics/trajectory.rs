@@ -2,14 +2,14 @@
 //!
 //! Everything here takes the pairs as they are: align the estimate first ([`crate::metrics::align`]).
 
-use serde::{Deserialize, Serialize};
-
 use crate::error::{DataError, DataResult};
 use crate::frames::{WorldFromBody, rotation_angle_rad};
 use crate::metrics::associate::PosePairs;
+use crate::statistics::median;
 
 /// What a list of errors amounts to, in the unit of the errors (`sse` in its square).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Statistics {
     /// Root of the mean square.
     pub rmse: f64,
@@ -43,15 +43,7 @@ impl Statistics {
             return Err(DataError::new("the errors are not finite or too large to be squared"));
         }
         let variance = errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / n;
-        let mut sorted = errors.to_vec();
-        let middle = sorted.len() / 2;
-        let (below, &mut upper, _) = sorted.select_nth_unstable_by(middle, f64::total_cmp);
-        let median = if errors.len() % 2 == 1 {
-            upper
-        } else {
-            // Not empty: an even number of errors has at least one below the middle.
-            f64::midpoint(below.iter().copied().fold(f64::NEG_INFINITY, f64::max), upper)
-        };
+        let median = median(&mut errors.to_vec()).unwrap_or(mean);
         Ok(Self {
             rmse: (sse / n).sqrt(),
             mean,
@@ -76,7 +68,8 @@ pub struct ApeErrors {
 }
 
 /// Statistics of the absolute pose error.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Ape {
     /// Of the distances, metres.
     pub translation_m: Statistics,
@@ -122,7 +115,8 @@ impl ApeErrors {
 }
 
 /// The paper's three numbers of an estimate against a reference.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Summary {
     /// RMSE_3D: root mean square of the position difference, metres.
     pub rmse_3d_m: f64,

@@ -1,13 +1,12 @@
 //! Key frames whose depth is doubtful.
 
-use serde::{Deserialize, Serialize};
-
 use super::PointName;
 use crate::time::Stamp;
 
 /// Why a depth is doubtful.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum DepthDoubtReason {
     /// Another source says another depth.
@@ -17,7 +16,8 @@ pub enum DepthDoubtReason {
 }
 
 /// A key frame whose depth is doubtful: it is scored all the same.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DepthDoubt {
     /// Name of the point.
     pub point: PointName,
@@ -30,13 +30,13 @@ pub struct DepthDoubt {
     /// The depth that another source says, or that would explain the error, metres.
     pub other_z_m: f64,
     /// The other source, where it is one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub other: Option<String>,
     /// Median error of the point's samples with the depth that was used, pixels, where the error tells it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub error_px: Option<f64>,
     /// The same with the depth that explains it best.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub error_then_px: Option<f64>,
 }
 

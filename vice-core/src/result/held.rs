@@ -1,12 +1,11 @@
 //! RMSE_2D of the labels that hold, with its interval: what stands in the document beside the paper's columns.
 
-use serde::{Deserialize, Serialize};
-
 use super::PointName;
 use crate::time::Stamp;
 
 /// A root mean square with its 95 % interval.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Figure {
     /// The value.
     pub rmse: f64,
@@ -15,7 +14,8 @@ pub struct Figure {
 }
 
 /// What the value and interval of a part rest on.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct HeldPart {
     /// Segments with a sample that holds.
     pub segments: u64,
@@ -30,23 +30,24 @@ pub struct HeldPart {
     /// The same error as a distance at the depth of the carried point, millimetres.
     pub mm: Option<Figure>,
     /// Degrees of freedom of the interval.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub degrees_of_freedom: Option<f64>,
     /// What is to be said of the interval: why there is none, or that it is wide.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub note: Option<String>,
     /// Share of the squared error of all scored samples that the heaviest segment carries.
     pub heaviest_segment_share: f64,
     /// Share of the squared error of all scored samples that the largest 1 % of them carry.
     pub heaviest_percent_share: f64,
     /// What was set aside, by point and in time.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub set_aside: Vec<SetAside>,
 }
 
 /// Why labels are set aside.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum AsideReason {
     /// The label jumps against its neighbours in time, and the other points do not.
@@ -56,7 +57,8 @@ pub enum AsideReason {
 }
 
 /// A label that does not hold.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SetAside {
     /// Name of the point.
     pub point: PointName,
@@ -71,13 +73,14 @@ pub struct SetAside {
 }
 
 /// The error at an age since the key frame, or after some motion.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WindowPart {
     /// Seconds since the key frame.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub age_s: Option<f64>,
     /// Metres that the camera moved since the key frame, along its path.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub moved_m: Option<f64>,
     /// Pixels; null where it is refused.
     pub px: Option<Figure>,
@@ -90,7 +93,7 @@ pub struct WindowPart {
     /// Samples in it.
     pub samples: u64,
     /// Why there is no number.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub refused: Option<String>,
 }
 

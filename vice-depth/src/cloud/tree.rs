@@ -5,7 +5,10 @@
 //! no second copy of the points at any time. Each leaf, some fifty points, also knows the patch of surface that it
 //! most likely is: how far apart its points are and which way it faces.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
+use vice_core::statistics::middle;
+
+use crate::scatter::Scatter;
 
 /// Most points of a leaf.
 const LEAF_POINTS: usize = 64;
@@ -264,9 +267,7 @@ fn median_neighbour_m(points: &[[f32; 3]]) -> f32 {
             nearest[j] = nearest[j].min(square);
         }
     }
-    let middle = nearest.len() / 2;
-    let (_, median, _) = nearest.select_nth_unstable_by(middle, |a, b| a.total_cmp(b));
-    median.sqrt()
+    middle(&mut nearest, f32::total_cmp).unwrap_or(f32::INFINITY).sqrt()
 }
 
 /// The two halves of points across the widest side of their box.
@@ -279,15 +280,9 @@ fn halves(points: &mut [[f32; 3]]) -> (&mut [[f32; 3]], &mut [[f32; 3]]) {
 /// The flat patch through points, by their moments: evenly spread over a rectangle or an ellipse of area `A` they
 /// have `A = 12 √(λ1 λ2)` with the two larger eigenvalues of their covariance, to within 5 %.
 fn flat_fit(points: &[[f32; 3]]) -> Patch {
-    let n = points.len().max(1) as f64;
     let at = |p: &[f32; 3]| Vector3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
-    let mean = points.iter().map(at).sum::<Vector3<f64>>() / n;
-    let mut covariance = Matrix3::zeros();
-    for p in points {
-        let d = at(p) - mean;
-        covariance += d * d.transpose();
-    }
-    let eigen = (covariance / n).symmetric_eigen();
+    let Scatter { count, mean, squares } = Scatter::of(points.iter().map(at));
+    let eigen = (squares / count).symmetric_eigen();
     let mut order = [0, 1, 2];
     order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
     let value = |i: usize| eigen.eigenvalues[order[i]].max(0.0);
@@ -295,7 +290,7 @@ fn flat_fit(points: &[[f32; 3]]) -> Patch {
     Patch {
         centre: [mean.x as f32, mean.y as f32, mean.z as f32],
         normal: [normal[0] as f32, normal[1] as f32, normal[2] as f32],
-        spacing_m: (12.0 * (value(1) * value(2)).sqrt() / n).sqrt() as f32,
+        spacing_m: (12.0 * (value(1) * value(2)).sqrt() / count).sqrt() as f32,
         thickness_m: value(0).sqrt() as f32,
     }
 }
@@ -304,14 +299,11 @@ fn flat_fit(points: &[[f32; 3]]) -> Patch {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use vice_core::random::Congruential;
 
     fn scattered(n: usize, side: [f32; 3]) -> Vec<[f32; 3]> {
-        let mut state = 1_u64;
-        let mut next = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 40) as f32 / (1_u64 << 24) as f32
-        };
-        (0..n).map(|_| side.map(|s| next() * s)).collect()
+        let mut random = Congruential::new(1);
+        (0..n).map(|_| side.map(|s| random.uniform(0.0, 1.0) as f32 * s)).collect()
     }
 
     #[test]

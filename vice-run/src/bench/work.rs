@@ -10,12 +10,13 @@ use vice_core::camera::{Camera, Model};
 use vice_core::dataset::{Floor, Plane};
 use vice_core::depth::Keyframe;
 use vice_core::frames::{BodyFromCamera, Rigid, WorldFromCamera};
+use vice_core::random::Congruential;
 use vice_core::time::Stamp;
 use vice_core::track::track_batch;
 use vice_depth::{Cloud, CloudOptions, ZMapDepth, ZMapOptions, depth_image, read_ply_points};
 
 use super::limits::{Machine, copy_bytes, seconds};
-use super::scan::{Numbers, room};
+use super::scan::room;
 use super::{KernelName, ModelName};
 use crate::error::{Context, RunResult};
 
@@ -95,7 +96,7 @@ fn motion() -> WorldFromCamera {
 
 impl Work {
     pub(super) fn new(kernel: KernelName, model: Option<ModelName>, n: usize) -> RunResult<Self> {
-        let mut numbers = Numbers::new(7);
+        let mut numbers = Congruential::new(7);
         let model = model.unwrap_or(ModelName::Pinhole);
         match kernel {
             KernelName::Project | KernelName::Unproject | KernelName::Track => {

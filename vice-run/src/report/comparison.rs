@@ -5,8 +5,9 @@ use std::fmt::Write;
 use crate::error::RunResult;
 use crate::result::ResultDocument;
 use serde::Serialize;
-use vice_core::paired::{Paired, WithInterval, paired};
+use vice_core::paired::{Paired, paired};
 use vice_core::result::{PixelPart, Role};
+use vice_core::statistics::WithInterval;
 
 use super::csv::cell;
 use super::latex::escape;

@@ -3,6 +3,7 @@
 
 use vice_core::dataset::{DepthImage, Image, PixelFormat};
 use vice_core::error::DataResult;
+use vice_core::statistics::{quantile, sorted};
 
 use super::font;
 use super::overlay::{Canvas, Colour};
@@ -71,10 +72,8 @@ pub(crate) fn difference_picture(width: u32, height: u32, metres: &[f32]) -> Dat
 /// The 1st and the 99th percentile of what is finite; the upper one at most four times the median, with room for
 /// values that are nearly all alike.
 fn percentile_range(values: &[f32]) -> (f64, f64) {
-    let mut finite: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    finite.sort_unstable_by(f32::total_cmp);
-    let pick = |p: f64| finite.get(((finite.len().saturating_sub(1)) as f64 * p).round() as usize).copied();
-    let at = |p: f64, otherwise: f32| f64::from(pick(p).unwrap_or(otherwise));
+    let finite = sorted(values.iter().filter(|v| v.is_finite()).map(|v| f64::from(*v)).collect());
+    let at = |p: f64, otherwise: f64| quantile(&finite, p).unwrap_or(otherwise);
     let (low, high) = (at(0.01, 0.0), at(0.99, 1.0).min((4.0 * at(0.5, 1.0)).max(1e-3)));
     if high > low { (low, high) } else { (low, low + 1e-3) }
 }

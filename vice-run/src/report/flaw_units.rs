@@ -1,22 +1,10 @@
 //! In which unit, and for which axis, a flaw's parameter is shown.
 
-use vice_core::diagnose::{Curve, Flaw};
+use vice_core::diagnose::{Curve, Flaw, PARAMETERS};
 
 /// The unit that a parameter is shown in, and how many of them one of its own is.
 pub(crate) fn shown_unit(curve: &Curve) -> (&'static str, f64) {
-    let degrees = 180.0 / std::f64::consts::PI;
-    match curve.flaw {
-        Flaw::ClockOffset => ("ms", 1e3),
-        Flaw::ExtrinsicRotation | Flaw::InitialTilt => ("°", degrees),
-        Flaw::ExtrinsicTranslation => ("mm", 1e3),
-        Flaw::FocalLength | Flaw::Scale | Flaw::Aspect => ("%", 1e2),
-        Flaw::ClockRate => ("ppm", 1e6),
-        Flaw::RollingShutter => ("ms", 1e3),
-        Flaw::Distortion => ("", 1.0),
-        Flaw::Drift if curve.parameter.ends_with("rad_s") => ("°/s", degrees),
-        Flaw::Drift => ("mm/s", 1e3),
-        _ => ("px", 1.0),
-    }
+    PARAMETERS.iter().find(|p| p.name == curve.parameter).map_or(("", 1.0), |p| (p.unit.sign, p.unit.each))
 }
 
 /// The axis of a parameter of several, as its name has it.

@@ -16,20 +16,6 @@ pub(crate) fn rms(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt())
 }
 
-/// The value below which a share of the sorted values lies, interpolated; `None` of nothing.
-pub(crate) fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
-    let last = sorted.len().checked_sub(1)?;
-    let place = share.clamp(0.0, 1.0) * last as f64;
-    let (low, high) = (place.floor() as usize, place.ceil() as usize);
-    Some(sorted[low] + (sorted[high] - sorted[low]) * (place - low as f64))
-}
-
-/// Values in ascending order.
-pub(crate) fn sorted(mut values: Vec<f64>) -> Vec<f64> {
-    values.sort_by(f64::total_cmp);
-    values
-}
-
 /// Pearson's correlation of pairs; `None` for fewer than three or where one side does not vary.
 pub(crate) fn correlation(pairs: &[(f64, f64)]) -> Option<f64> {
     if pairs.len() < 3 {
@@ -135,9 +121,6 @@ mod tests {
     #[test]
     fn statistics_by_hand() {
         assert_eq!((mean(&[]), mean(&[1.0, 2.0])), (None, Some(1.5)));
-        assert_eq!(quantile(&[1.0, 2.0, 4.0], 0.5), Some(2.0));
-        assert_eq!(quantile(&[1.0, 2.0], 0.25), Some(1.25));
-        assert_eq!(quantile(&[], 0.5), None);
         let line = correlation(&[(0.0, 1.0), (1.0, 3.0), (2.0, 5.0)]).unwrap();
         assert!((line - 1.0).abs() < 1e-12);
         assert_eq!(px(f64::INFINITY), "more px than can be counted");

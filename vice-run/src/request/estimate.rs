@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
+use vice_core::error::DataResult;
+use vice_files::trajectory::{ReadOptions, TrajectoryFile, read, read_relative};
 
 /// Starts the name of a file of relative motions.
 const RELATIVE: &str = "rel:";
@@ -35,6 +37,18 @@ impl EstimateSpec {
             Self::Named(name) => Some(Path::new(name)),
             Self::Relative(path) => Some(path),
             Self::ImuEuler => None,
+        }
+    }
+
+    /// Reads it as a file.
+    ///
+    /// # Errors
+    /// [`DataError`](vice_core::error::DataError) if there is no such file, or it holds no poses.
+    pub fn read_file(&self, options: &ReadOptions) -> DataResult<TrajectoryFile> {
+        match self {
+            Self::Relative(path) => read_relative(path),
+            Self::Named(name) => read(name, options),
+            Self::ImuEuler => read(IMU_EULER, options),
         }
     }
 

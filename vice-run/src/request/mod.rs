@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use vice_core::conventions::Convention;
+pub use vice_core::evaluate::DEFAULT_MAX_GAP;
 use vice_core::evaluate::{Observations, Window};
 use vice_core::metrics::align::Alignment;
 use vice_core::time::Span;
@@ -166,9 +167,6 @@ pub struct StreamsSpec {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initial_pose: Option<[f64; 7]>,
 }
-
-/// Widest gap that is interpolated where nothing else is said.
-pub const DEFAULT_MAX_GAP: Span = Span::from_millis(100);
 
 const fn default_max_gap() -> Span {
     DEFAULT_MAX_GAP

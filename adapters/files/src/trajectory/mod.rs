@@ -132,17 +132,6 @@ pub struct ReadOptions {
     pub index_as_seconds: bool,
 }
 
-/// Reads what an option names: `FILE`, or `rel:FILE` for relative motions.
-///
-/// # Errors
-/// As [`read`] and [`read_relative`].
-pub fn read_spec(spec: &str, options: &ReadOptions) -> DataResult<TrajectoryFile> {
-    match spec.strip_prefix("rel:") {
-        Some(file) => read_relative(file),
-        None => read(spec, options),
-    }
-}
-
 /// Reads a file of absolute poses in the format its content shows.
 ///
 /// # Errors

@@ -1,5 +1,6 @@
 //! Whether poses can be those of a robot: the unit of a length shows in the speed.
 
+use vice_core::statistics::middle;
 use vice_core::suspicion::Suspicion;
 use vice_core::trajectory::Trajectory;
 
@@ -20,8 +21,7 @@ pub(super) fn suspicion(trajectory: &Trajectory, about: &str) -> Option<Suspicio
             (poses[i].translation() - poses[i - 1].translation()).norm() / seconds
         })
         .collect();
-    let middle = speeds.len() / 2;
-    let median = *speeds.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let median = middle(&mut speeds, f64::total_cmp)?;
     (median > MOST_M_S).then(|| {
         Suspicion::new("implausible-speed", about, "the poses move too fast for metres and seconds")
             .evidence(format!("half of the time faster than {median:.0} m/s"))

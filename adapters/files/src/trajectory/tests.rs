@@ -131,8 +131,7 @@ fn relative_motions_are_chained() {
     let folder = Folder::new();
     // The body moves 1 m along its x: points come 1 m nearer, so `T^{B_t1,B_t0}` has x = -1.
     let path = folder.file("rel.txt", "# t0 t1\n10.0 10.5 -1 0 0 0 0 0 1\n10.5 11 -1 0 0 0 0 0 1\n");
-    let spec = format!("rel:{}", path.display());
-    let file = read_spec(&spec, &ReadOptions::default()).unwrap();
+    let file = read_relative(&path).unwrap();
     assert_eq!((file.format, file.trajectory.len()), (TrajectoryFormat::Relative, 3));
     assert_eq!(file.trajectory.poses()[2].translation(), Vector3::new(2.0, 0.0, 0.0));
     let says = |text: &str, expected: &str| {

@@ -56,7 +56,7 @@ impl Files {
 fn picture([right, down]: [f64; 2]) -> Result<Image, DataError> {
     const MARGIN: usize = 16;
     let (width, height) = (752 + 2 * MARGIN, 480 + 2 * MARGIN);
-    let mut smooth = vice_benches::Numbers::new(7).list(width * height, 0.0, 255.0);
+    let mut smooth = vice_core::random::Congruential::new(7).list(width * height, 0.0, 255.0);
     // Three means over five pixels each way are nearly a Gaussian of 2.4 pixels.
     for step in [1, width, 1, width, 1, width] {
         let before = smooth.clone();

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use vice_core::statistics::sorted;
+
 use crate::table::{significant, spread};
 
 /// One measurement: the kernel, and the limit measured beside it, nanoseconds a point.
@@ -44,12 +46,9 @@ impl Sizes {
                 let Some(one) = by_threads.get(&1).filter(|costs| !costs.is_empty()) else { continue };
                 let two = by_threads.get(&2).map_or(&[][..], Vec::as_slice);
                 let best = |of: fn(&Cost) -> f64| one.iter().map(of).fold(f64::INFINITY, f64::min);
-                let sorted = |mut values: Vec<f64>| {
-                    values.sort_by(f64::total_cmp);
-                    spread(&values)
+                let gain = |of: fn(&Cost) -> f64| {
+                    spread(&sorted(one.iter().zip(two).map(|(a, b)| of(a) / of(b)).collect()))
                 };
-                let gain =
-                    |of: fn(&Cost) -> f64| sorted(one.iter().zip(two).map(|(a, b)| of(a) / of(b)).collect());
                 let costs = [best(|c| c.kernel_ns), best(|c| c.limit_ns)];
                 for ((least, most), cost) in range.iter_mut().zip(costs) {
                     (*least, *most) = (least.min(cost), most.max(cost));
@@ -58,7 +57,7 @@ impl Sizes {
                     text,
                     "| {kernel} | {points} | {} | {} | {} | {} |",
                     significant(costs[0]),
-                    sorted(one.iter().map(|c| c.limit_ns / c.kernel_ns).collect()),
+                    spread(&sorted(one.iter().map(|c| c.limit_ns / c.kernel_ns).collect())),
                     gain(|c| c.kernel_ns),
                     gain(|c| c.limit_ns),
                 );

@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use serde_json::Value;
+use vice_core::statistics::{quantile, sorted};
 
 use crate::sizes::Sizes;
 
@@ -151,13 +152,12 @@ impl Rounds {
     fn ratios(&self, theirs: (Side, &str), ours: (Side, &str)) -> Vec<f64> {
         let get = |(side, name): (Side, &str)| self.times.get(&(side, name.to_string()));
         let (Some((n, theirs)), Some((m, ours))) = (get(theirs), get(ours)) else { return vec![] };
-        let mut ratios: Vec<f64> = theirs
+        let ratios = theirs
             .iter()
             .zip(ours)
             .filter_map(|(t, o)| Some(((*t)? / *n as f64) / ((*o)? / *m as f64)))
             .collect();
-        ratios.sort_by(f64::total_cmp);
-        ratios
+        sorted(ratios)
     }
 
     /// The best time of a point, nanoseconds.
@@ -224,10 +224,9 @@ pub(crate) fn significant(value: f64) -> String {
 
 /// The median of sorted values, and their range.
 pub(crate) fn spread(sorted: &[f64]) -> String {
-    match (sorted.first(), sorted.last()) {
-        (Some(least), Some(most)) => {
-            let middle = sorted[sorted.len() / 2];
-            format!("{} ({} to {})", significant(middle), significant(*least), significant(*most))
+    match (quantile(sorted, 0.5), sorted.first(), sorted.last()) {
+        (Some(median), Some(least), Some(most)) => {
+            format!("{} ({} to {})", significant(median), significant(*least), significant(*most))
         }
         _ => String::new(),
     }

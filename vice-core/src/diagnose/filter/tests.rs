@@ -7,7 +7,7 @@ use super::*;
 use crate::random::SplitMix;
 
 fn uniform(random: &mut SplitMix) -> f64 {
-    (random.next() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    (random.bits() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
 }
 
 /// Three segments over eight frames, two of one point after another.
@@ -183,7 +183,7 @@ fn covariance(geometry: &Geometry, sizes: &Sizes, weights: &Weights) -> DMatrix<
 
 #[test]
 fn the_pass_is_the_full_covariance() {
-    let mut random = SplitMix(11);
+    let mut random = SplitMix::new(11);
     for (inertial, own_anchor) in [(false, false), (false, true), (true, false)] {
         let geometry = scene(&mut random, inertial, own_anchor);
         let n = geometry.labels.len();

@@ -2,8 +2,8 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::parallel::*;
 use nalgebra::UnitQuaternion;
-use rayon::prelude::*;
 
 use super::{ALL_PAIRS_TOLERANCE, Delta, DeltaUnit, MAX_PAIRS, PairMode, PairsFrom, RpeOptions};
 use crate::error::{DataError, DataResult};

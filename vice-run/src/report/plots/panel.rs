@@ -1,5 +1,7 @@
 //! A rectangle with two axes in a picture, and what is drawn in it.
 
+use vice_core::statistics::middle;
+
 use super::MAX_DOTS;
 use super::axis::Axis;
 use super::picture::{Anchor, Picture, Place};
@@ -102,8 +104,7 @@ pub(crate) fn extremes(values: &[(f64, f64)], most: usize) -> Vec<(f64, f64)> {
 /// Three times the usual distance of neighbours in x, above which a line is broken.
 pub(crate) fn usual_gap(values: &[(f64, f64)]) -> f64 {
     let mut steps: Vec<f64> = values.windows(2).map(|w| w[1].0 - w[0].0).collect();
-    steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).map_or(f64::INFINITY, |median| 3.0 * median)
+    middle(&mut steps, f64::total_cmp).map_or(f64::INFINITY, |step| 3.0 * step)
 }
 
 #[cfg(test)]

@@ -1,12 +1,13 @@
 //! How the errors are spread: over the points, and over their sizes.
 
 use vice_core::result::PixelPart;
+use vice_core::statistics::{quantile, sorted};
 
 use super::axis::Axis;
 use super::panel::Panel;
 use super::picture::{Anchor, Picture};
 use super::{LEFT, NONE_PX, Plot, RIGHT, WIDTH};
-use crate::report::numbers::{errors_by_point, px, quantile, rms, sorted};
+use crate::report::numbers::{errors_by_point, px, rms};
 use crate::text::printable;
 
 /// More points than this are left out of the picture, the best first.

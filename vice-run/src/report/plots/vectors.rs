@@ -1,12 +1,12 @@
 //! Error vectors over the image. A pattern in them points at intrinsics or extrinsics.
 
 use vice_core::result::PixelPart;
+use vice_core::statistics::{quantile, sorted};
 
 use super::axis::Axis;
 use super::panel::{Panel, how_many};
 use super::picture::Picture;
 use super::{MAX_DOTS, NONE_PX, Plot, WIDTH};
-use crate::report::numbers::{quantile, sorted};
 
 /// What of the errors is common to all: `error = shift + zoom q + turn J q`, `q` the label from the mean of all labels.
 /// The three parts and the rest are orthogonal, so that their shares of the squared error add up to one.
