@@ -21,7 +21,7 @@ const USUAL_TIMES: f64 = 4.5;
 /// A second flaw must add this, as a logarithm.
 const SECOND: f64 = 20.0;
 /// ... and bring what is left to less than this, or add this: what is left is mostly the walk of the odometry.
-const SURE_SECOND: f64 = 35.0;
+const SURE_SECOND: f64 = 60.0;
 const NEARER_WITH_SECOND: f64 = 0.97;
 /// No flaw is said where it has this share of the hypotheses.
 const NONE: f64 = 0.3;
