@@ -71,7 +71,8 @@ impl DepthSpec {
             DepthName::ZMap => {
                 let (cloud, reference) = self.cloud(name, dataset.as_ref())?;
                 let occlusion = self.zmap_occlusion.unwrap_or(true);
-                let options = ZMapOptions { occlusion, ..ZMapOptions::default() };
+                let interpolation = self.zmap_interpolation.unwrap_or_default().into();
+                let options = ZMapOptions { occlusion, interpolation, ..ZMapOptions::default() };
                 Ok(Box::new(ZMapDepth::new(cloud, reference.world_from_cloud, options)))
             }
             DepthName::ZCam => {

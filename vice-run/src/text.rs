@@ -34,7 +34,7 @@ pub fn with_options(hint: &str) -> String {
 }
 
 /// Fields that have an option of the same name.
-const FIELDS: [&str; 33] = [
+const FIELDS: [&str; 34] = [
     "add",
     "align",
     "allow-writable-plugin",
@@ -67,6 +67,7 @@ const FIELDS: [&str; 33] = [
     "start",
     "tag-size",
     "time-offset",
+    "zmap-interpolation",
     "zmap-occlusion",
 ];
 

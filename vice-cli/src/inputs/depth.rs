@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use vice_run::core::time::Span;
 use vice_run::detect::TagFamily;
 use vice_run::request::DepthName;
-use vice_run::request::{DatasetSpec, DepthSpec, ReferenceSpec};
+use vice_run::request::{DatasetSpec, DepthSpec, ReferenceSpec, ZMapInterpolation};
 
 use super::{DatasetArgs, numbers, positive, span_not_negative, split_list};
 use crate::terminal::usage;
@@ -20,6 +20,9 @@ pub(crate) struct DepthArgs {
     /// Whether the Z-map leaves out cloud points that are hidden; off reproduces the paper [default: on].
     #[arg(long, value_name = "on|off", action = clap::ArgAction::Set, value_parser = on_off)]
     zmap_occlusion: Option<bool>,
+    /// How the Z-map finds depth between points: linear (in triangles) or natural (natural neighbours) [default: linear].
+    #[arg(long, value_name = "linear|natural")]
+    zmap_interpolation: Option<ZMapInterpolation>,
     /// Thin the cloud to one point for each cube of this size, metres.
     #[arg(long, value_name = "M", value_parser = positive)]
     cloud_voxel: Option<f64>,
@@ -75,6 +78,7 @@ impl DepthArgs {
         Ok(DepthSpec {
             sources,
             zmap_occlusion: self.zmap_occlusion,
+            zmap_interpolation: self.zmap_interpolation,
             cloud_voxel_m: self.cloud_voxel,
             zcam_range_m: self.zcam_range,
             tag_size_m: self.tag_size,

@@ -9,7 +9,7 @@ use vice_run::request::{LabelsSpec, Protocol, Request, Scoring};
 use super::{DatasetArgs, DepthArgs, StreamArgs, positive, span_not_negative, split_list};
 
 /// What a request in a file takes the place of.
-pub(crate) const ASKED: [&str; 29] = [
+pub(crate) const ASKED: [&str; 30] = [
     "path",
     "format",
     "settings",
@@ -34,6 +34,7 @@ pub(crate) const ASKED: [&str; 29] = [
     "depth",
     "floor_plane",
     "zmap_occlusion",
+    "zmap_interpolation",
     "cloud_voxel",
     "zcam_range",
     "tag_size",

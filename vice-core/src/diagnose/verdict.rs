@@ -18,11 +18,9 @@ const FEWEST_LABELS: usize = 8;
 const HARDLY_LESS: f64 = 0.9;
 /// Of two flaws at once each is at most this times what is expected of it.
 const USUAL_TIMES: f64 = 4.5;
-/// A second flaw must add this, as a logarithm.
-const SECOND: f64 = 20.0;
-/// ... and bring what is left to less than this, or add this: what is left is mostly the walk of the odometry.
-const SURE_SECOND: f64 = 60.0;
-const NEARER_WITH_SECOND: f64 = 0.97;
+/// A second flaw must add this, as a logarithm, and bring what is left to less than this share: little of what is left
+/// may be the flaw's where it is mostly the walk of the odometry, or a small gain of evidence chance.
+const SECOND: [(f64, f64); 3] = [(12.0, 0.75), (20.0, 0.97), (60.0, f64::INFINITY)];
 /// No flaw is said where it has this share of the hypotheses.
 const NONE: f64 = 0.3;
 /// Beyond these times the expected walk an odometry is not healthy.
@@ -141,8 +139,8 @@ fn core(search: &Search) -> Option<Vec<Flaw>> {
         let shown: Vec<Flaw> = best.flaws.iter().copied().filter(|f| shows(best, *f)).collect();
         let first = shown.iter().filter_map(|f| single(*f)).max_by(|a, b| a.score.total_cmp(&b.score))?;
         let gain = best.score - first.score;
-        let nearer = || usual_rms(best) < NEARER_WITH_SECOND * usual_rms(first);
-        let is_second = shown.len() == 2 && (gain >= SURE_SECOND || (gain >= SECOND && nearer()));
+        let left = usual_rms(best) / usual_rms(first).max(f64::MIN_POSITIVE);
+        let is_second = shown.len() == 2 && SECOND.iter().any(|(least, most)| gain >= *least && left < *most);
         if !is_second {
             core = first;
         }

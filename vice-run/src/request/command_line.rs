@@ -48,6 +48,7 @@ fn options(request: &Request) -> Vec<(&'static str, String)> {
     add("anchor", streams.anchor.as_ref().map(ToString::to_string));
     add("initial-pose", streams.initial_pose.and_then(|p| numbers(&p)));
     add("depth", list(depth.sources.iter().map(|n| n.name().to_string()).collect()));
+    add("zmap-interpolation", depth.zmap_interpolation.map(|i| i.name().to_string()));
     add("zmap-occlusion", depth.zmap_occlusion.map(|on| if on { "on" } else { "off" }.to_string()));
     add("cloud-voxel", depth.cloud_voxel_m.map(|v| v.to_string()));
     add("zcam-range", depth.zcam_range_m.and_then(|r| numbers(&r)));

@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
+use vice_depth::Interpolation;
 
 /// A depth source by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -50,6 +51,45 @@ impl FromStr for DepthName {
         let known = || Self::ALL.map(Self::name).join(", ");
         let found = Self::ALL.into_iter().find(|n| n.name() == text);
         found.ok_or_else(|| format!("unknown depth source {text}; known: {}", known()))
+    }
+}
+
+/// How a Z-map finds depth between the points of its cloud.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ZMapInterpolation {
+    /// On the plane of the triangle around the pixel.
+    #[default]
+    Linear,
+    /// By natural neighbours.
+    Natural,
+}
+
+impl ZMapInterpolation {
+    /// The name in requests and options.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::Natural => "natural",
+        }
+    }
+}
+
+impl FromStr for ZMapInterpolation {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = [Self::Linear, Self::Natural].into_iter().find(|i| i.name() == text);
+        found.ok_or_else(|| format!("unknown interpolation {text}; known: linear, natural"))
+    }
+}
+
+impl From<ZMapInterpolation> for Interpolation {
+    fn from(name: ZMapInterpolation) -> Self {
+        match name {
+            ZMapInterpolation::Linear => Self::Linear,
+            ZMapInterpolation::Natural => Self::Natural,
+        }
     }
 }
 

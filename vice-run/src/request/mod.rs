@@ -20,7 +20,7 @@ use vice_core::metrics::align::Alignment;
 use vice_core::time::Span;
 use vice_detect::TagFamily;
 
-pub use depth_name::DepthName;
+pub use depth_name::{DepthName, ZMapInterpolation};
 pub use estimate::{Anchor, EstimateFrame, EstimateSpec, IMU_EULER, ReferenceSpec};
 
 pub(crate) use word::{seconds, seconds_option};
@@ -198,6 +198,9 @@ pub struct DepthSpec {
     /// Whether the Z-map leaves out cloud points that are hidden; `None`: yes. Off reproduces the paper.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zmap_occlusion: Option<bool>,
+    /// How depth is found between the points of the cloud; `None`: linearly, in triangles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zmap_interpolation: Option<ZMapInterpolation>,
     /// Thin the cloud to one point for each cube of this size, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cloud_voxel_m: Option<f64>,
@@ -322,6 +325,7 @@ impl DepthSpec {
         use DepthName::{Tag, ZCam, ZMap};
         let settings = [
             ("zmap-occlusion", self.zmap_occlusion.is_some(), ZMap),
+            ("zmap-interpolation", self.zmap_interpolation.is_some(), ZMap),
             ("cloud-voxel", self.cloud_voxel_m.is_some(), ZMap),
             ("zcam-range", self.zcam_range_m.is_some(), ZCam),
             ("tag-size", self.tag_size_m.is_some(), Tag),

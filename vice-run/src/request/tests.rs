@@ -26,6 +26,7 @@ fn everything() -> Request {
     request.streams.initial_pose = Some([1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]);
     request.depth.sources = vec![DepthName::ZMap, DepthName::Tag];
     request.depth.zmap_occlusion = Some(false);
+    request.depth.zmap_interpolation = Some(ZMapInterpolation::Natural);
     request.depth.tag_size_m = Some(0.1);
     request.depth.tag_family = Some(TagFamily::T25h9);
     request.depth.compare = Some(false);
@@ -55,8 +56,8 @@ fn the_command_line_says_what_is_not_the_default() {
         "vice evaluate 'my run' --format locobot --set stamps=record --calibration cal.toml --floor-plane 0,0,1,-0.1 \
          --labels labels.csv --points a --observations manual --fps 10 --start 1.000000001 --duration 30 \
          --estimate odom,rel:motions.txt,imu-euler --reference truth.txt --estimate-frame camera --time-offset -0.05 \
-         --anchor estimate --initial-pose 1,2,3,0,0,0,1 --depth zmap,tag --zmap-occlusion off --tag-size 0.1 \
-         --tag-family 25h9 --depth-check off --subsets 1,2 --align yaw"
+         --anchor estimate --initial-pose 1,2,3,0,0,0,1 --depth zmap,tag --zmap-interpolation natural \
+         --zmap-occlusion off --tag-size 0.1 --tag-family 25h9 --depth-check off --subsets 1,2 --align yaw"
     );
 }
 

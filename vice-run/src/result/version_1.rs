@@ -122,6 +122,7 @@ fn request(s: &Settings, dataset: &DatasetPart, pixel: &[PixelPart]) -> Request 
         depth: DepthSpec {
             sources,
             zmap_occlusion: (!s.zmap_occlusion).then_some(false),
+            zmap_interpolation: None,
             cloud_voxel_m: other("cloud-voxel").and_then(|v| v.parse().ok()),
             zcam_range_m: <[f64; 2]>::try_from(numbers("zcam-range")).ok(),
             tag_size_m: other("tag-size").and_then(|v| v.parse().ok()),
