@@ -5,6 +5,8 @@
 //! (made by the pose error, jitter and label noise of its key frame and by its depth) and the walk of its label. All
 //! labels of a frame share its pose, all labels of a segment its key frame. Cost: frames times the square of the state.
 
+#![expect(clippy::needless_range_loop, reason = "indices of matrices are clearer as indices")]
+
 mod state;
 mod update;
 
@@ -288,10 +290,10 @@ impl<'p> Pass<'p> {
         for one in &self.following {
             let mut own = [[0.0; 2 * AT_ONCE]; 2];
             for (axis, own) in own.iter_mut().enumerate() {
-                if self.shifts == Shifts::Labels {
-                    if let Some(i) = labels.iter().position(|l| *l == one.of) {
-                        own[2 * i + axis] = 1.0;
-                    }
+                if self.shifts == Shifts::Labels
+                    && let Some(i) = labels.iter().position(|l| *l == one.of)
+                {
+                    own[2 * i + axis] = 1.0;
                 }
                 self.update.mean(&mut self.state.means[one.columns[axis]], rows, &mut own[..m]);
             }

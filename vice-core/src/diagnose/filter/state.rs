@@ -1,7 +1,5 @@
 //! The state of the pass: its covariance and one mean for each column.
 
-#![expect(clippy::needless_range_loop, reason = "indices of matrices are clearer as indices")]
-
 use super::super::geometry::SegmentAnswer;
 
 /// Numbers of a followed point: its place and the walk of its label.
@@ -97,18 +95,14 @@ impl State {
         after[..POSE * s].copy_from_slice(&before[..POSE * s]);
         for row in self.p.chunks_exact_mut(s).take(self.n) {
             let (before, after) = row.split_at_mut(now);
-            for i in 0..POSE {
-                after[i] = before[i];
-            }
+            after[..POSE].copy_from_slice(&before[..POSE]);
         }
         for i in 0..POSE {
             self.widen(now + i, jitter[i] * jitter[i]);
         }
         for mean in &mut self.means {
             let (before, after) = mean.split_at_mut(now);
-            for i in 0..POSE {
-                after[i] = before[i];
-            }
+            after[..POSE].copy_from_slice(&before[..POSE]);
         }
     }
 

@@ -1,8 +1,6 @@
 //! Labels of one frame taken in together: the rows that they add, by Cholesky's decomposition of their covariance. The same
 //! numbers as one by one, with each number of the covariance read and written once.
 
-#![expect(clippy::needless_range_loop, reason = "indices of matrices are clearer as indices")]
-
 use pulp::Simd;
 
 use super::state::{POSE, State};
