@@ -122,18 +122,19 @@ pub(super) fn listed(words: &[String], last: &str) -> String {
 mod tests {
     use super::*;
 
-    fn estimated(value: f64, low: f64, high: f64) -> Estimated {
-        Estimated { name: "n".to_string(), value, low, high }
+    fn estimated(name: &str, value: f64, low: f64, high: f64) -> Estimated {
+        Estimated { name: name.to_string(), value, low, high }
     }
 
     #[test]
     fn lines_say_value_unit_and_interval() {
-        let offset = [estimated(0.0503, 0.0491, 0.0516)];
+        let offset = [estimated("offset_s", 0.0503, 0.0491, 0.0516)];
         assert_eq!(line(Flaw::ClockOffset, &offset, None), "clock offset: +50.3 ms [49.1, 51.6]");
-        let focal = [estimated(-0.03, -0.0312, -0.0291)];
+        let focal = [estimated("focal_share", -0.03, -0.0312, -0.0291)];
         assert_eq!(line(Flaw::FocalLength, &focal, None), "focal length: -3.00 % [-3.12, -2.91]");
-        let turn = [0.0, 0.01, 0.0].map(|v: f64| estimated(v, v - 0.001, v + 0.001));
-        let size = estimated(0.01, 0.009, 0.011);
+        let turn = [("x", 0.0), ("y", 0.01), ("z", 0.0)]
+            .map(|(axis, v): (_, f64)| estimated(&format!("rotation_{axis}_rad"), v, v - 0.001, v + 0.001));
+        let size = estimated("rotation_rad", 0.01, 0.009, 0.011);
         assert_eq!(
             line(Flaw::ExtrinsicRotation, &turn, Some(&size)),
             "extrinsic rotation: 0.57° [0.52, 0.63] (x +0.00, y +0.57, z +0.00°)"
