@@ -14,6 +14,7 @@ mod select;
 #[cfg(test)]
 mod tests;
 mod thin;
+mod triangle;
 
 use std::sync::Arc;
 
@@ -26,10 +27,11 @@ use vice_core::frames::{self, Rigid, World};
 use vice_core::suspicion::Suspicion;
 
 use crate::cloud::Cloud;
-use interpolate::{Limits, Local, Surface};
+use interpolate::{Local, Surface};
 use occlude::Occlusion;
 use queries::Queries;
 use select::{Seen, View, Window};
+use triangle::Limits;
 
 /// More pixels than this are answered by triangulating the whole image.
 const MOST_WINDOWS: usize = 64;

@@ -5,8 +5,8 @@ use spade::handles::FixedVertexHandle;
 use spade::{DelaunayTriangulation, NaturalNeighbor, Point2, Triangulation};
 use vice_core::camera::Pixel;
 
-use super::interpolate::{Corner, Limits, Triangle, by_pixel, off_surface};
 use super::select::Seen;
+use super::triangle::{Corner, Limits, Triangle, by_pixel, off_surface};
 
 /// Weights of natural neighbours over one triangulation.
 pub(super) struct Natural<'t> {

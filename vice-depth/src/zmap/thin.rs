@@ -3,9 +3,9 @@
 //! A square is the same whatever window it is looked at through, and its point is the one nearest to its centre, so
 //! that the choice depends on nothing else.
 
-use super::interpolate::by_pixel;
 use super::queries::floor;
 use super::select::{Seen, Window};
+use super::triangle::by_pixel;
 
 /// At most one point for each square of a window.
 pub(super) struct Thinned {
