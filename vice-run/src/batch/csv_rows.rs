@@ -3,7 +3,7 @@
 use vice_core::error::{DataError, DataResult, ErrorKind};
 
 use super::cells::{Cells, RawRow};
-use super::field::{Cell, RUN_ID};
+use super::field::{self, Cell, RUN_ID};
 
 /// The run_id of the row that all others start from.
 const DEFAULTS: &str = "defaults";
@@ -26,6 +26,9 @@ pub(super) fn read(text: &str) -> DataResult<(Cells, Vec<RawRow>)> {
         })?;
         let line = record.position().map_or(0, |p| line_from(text, p));
         let Some(names) = &heading else {
+            for name in &record {
+                field::place(name.trim_start_matches('\u{feff}')).map_err(|e| wrong(line, e))?;
+            }
             heading = Some(record);
             continue;
         };
@@ -41,9 +44,6 @@ pub(super) fn read(text: &str) -> DataResult<(Cells, Vec<RawRow>)> {
             let name = name.trim_start_matches('\u{feff}');
             if !value.is_empty() {
                 cells.add(name, Cell::Text(value.to_string()), line)?;
-            } else {
-                // A column that is unknown is so even where it is empty.
-                super::field::place(name).map_err(|e| wrong(1, e))?;
             }
         }
         let id = cells.get(RUN_ID).cloned();
