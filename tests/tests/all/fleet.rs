@@ -186,6 +186,15 @@ fn what_is_wrong_with_a_manifest_is_one_line_and_nothing_is_written() {
     let planned = batch(&manifest, &out, &["--dry-run"]);
     assert!(planned.code == 0 && planned.stdout.starts_with("to run\tflight\t"), "{}", planned.stdout);
     assert!(!out.exists());
+    // A changed manifest whose batch was stopped at once: the old result is no answer to it.
+    fs::write(&manifest, "run_id,dataset,labels,estimate\na,flight,flight/labels/floor.csv,imu-euler\n")
+        .unwrap();
+    assert_eq!(batch(&manifest, &out, &[]).code, 0);
+    assert!(bytes(&out).0.contains(",done,0,"));
+    let text = "run_id,dataset,labels,estimate,fps\nb,flight,flight/labels/floor.csv,imu-euler,2\na,flight,flight/labels/floor.csv,imu-euler,2\n";
+    fs::write(&manifest, text).unwrap();
+    assert_eq!(batch(&manifest, &out, &["--shard", "1/2"]).code, 0);
+    assert!(bytes(&out).0.contains("vice.results/1,a,,flight,,missing,"), "{}", bytes(&out).0);
     let table = vice_in(flight(), &["table", flight().to_str().unwrap()]);
     assert!(table.code == 1 && table.stderr.contains("is no folder of a batch"), "{}", table.stderr);
 }

@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
+use super::key::Key;
 use super::results::{ResultRow, SCHEMA, to_csv};
-use super::store::Store;
+use super::store::{RowRecord, Store};
 use crate::error::RunResult;
 use crate::report::csv::cell;
 use crate::result;
@@ -45,7 +46,12 @@ pub fn collect(store: &Store) -> RunResult<Collected> {
             status: "missing".to_string(),
             ..ResultRow::default()
         };
-        let Some(record) = store.row(&listed.run_id)? else {
+        // What was found before the manifest was changed, or was deleted since, is no answer to it.
+        let is_answer = |record: &RowRecord| {
+            let is_there = |key: &Key| record.error.is_some() || store.result_path(key).exists();
+            record.asked == listed.asked && record.key.as_ref().is_none_or(is_there)
+        };
+        let Some(record) = store.row(&listed.run_id)?.filter(is_answer) else {
             collected.missing += 1;
             collected.rows.push(common);
             continue;

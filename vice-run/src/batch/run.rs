@@ -207,7 +207,7 @@ fn one(
     retry: usize,
 ) -> RunResult<(RowRecord, State)> {
     let begun = Instant::now();
-    let record = |key, error| RowRecord::new(&row.run_id, key, error, begun.elapsed().as_secs_f64());
+    let record = |key, error| RowRecord::new(row, key, error, begun.elapsed().as_secs_f64());
     let failed = |key: Option<Key>, error: &RunError| {
         let exit_code = if error.kind() == ErrorKind::Usage { 2 } else { 1 };
         record(key, Some((told(error, base), exit_code)))
@@ -218,9 +218,7 @@ fn one(
     };
     if store.result_path(&key).exists() {
         return match store.row(&row.run_id) {
-            Ok(Some(there)) if there.key.as_ref() == Some(&key) && there.error.is_none() => {
-                Ok((there, State::Skipped))
-            }
+            Ok(Some(there)) if there.answers(row, &key) => Ok((there, State::Skipped)),
             _ => written(store, record(Some(key), None), State::Skipped),
         };
     }

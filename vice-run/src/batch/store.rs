@@ -11,7 +11,8 @@ use vice_files::atomic::{self, Overwrite};
 
 use super::content::hex;
 use super::key::Key;
-use super::manifest::Manifest;
+use super::manifest::{Manifest, Row};
+use crate::request::Request;
 use crate::result::{ResultDocument, read_bytes};
 
 const BATCH_SCHEMA: &str = "vice.batch/1";
@@ -38,6 +39,8 @@ pub(super) struct ListedRow {
     pub(super) run_id: String,
     pub(super) group: String,
     pub(super) dataset: String,
+    /// Hash of what is asked, so that the answer to an older manifest is not taken for one to this.
+    pub(super) asked: String,
 }
 
 /// How a run went: `rows/HASH.json`.
@@ -46,6 +49,8 @@ pub struct RowRecord {
     schema: String,
     /// Its name.
     pub run_id: String,
+    /// Hash of what was asked.
+    pub(super) asked: String,
     /// What its result is filed under; null where not even that could be found.
     pub key: Option<Key>,
     /// Why there is no result.
@@ -58,9 +63,15 @@ pub struct RowRecord {
 
 impl RowRecord {
     /// How a run went.
-    pub(super) fn new(run_id: &str, key: Option<Key>, error: Option<(String, u8)>, seconds: f64) -> Self {
+    pub(super) fn new(row: &Row, key: Option<Key>, error: Option<(String, u8)>, seconds: f64) -> Self {
         let (error, exit_code) = error.map_or((None, 0), |(text, code)| (Some(text), code));
-        Self { schema: ROW_SCHEMA.to_string(), run_id: run_id.to_string(), key, error, exit_code, seconds }
+        let (schema, run_id) = (ROW_SCHEMA.to_string(), row.run_id.clone());
+        Self { schema, run_id, asked: asked(&row.request), key, error, exit_code, seconds }
+    }
+
+    /// Whether it says that a key holds the answer to a row.
+    pub(super) fn answers(&self, row: &Row, key: &Key) -> bool {
+        self.key.as_ref() == Some(key) && self.error.is_none() && self.asked == asked(&row.request)
     }
 }
 
@@ -87,6 +98,7 @@ impl Store {
             run_id: row.run_id.clone(),
             group: row.group.clone(),
             dataset: row.request.dataset.path.display().to_string(),
+            asked: asked(&row.request),
         });
         let listed = Listed { schema: BATCH_SCHEMA.to_string(), rows: rows.collect() };
         if self.listed().is_ok_and(|there| there == listed) {
@@ -140,6 +152,12 @@ impl Store {
     pub(super) fn write_result(&self, key: &Key, document: &ResultDocument) -> DataResult<()> {
         write_json(&self.result_path(key), document)
     }
+}
+
+fn asked(request: &Request) -> String {
+    // A request is plain data: there is nothing in it that JSON cannot hold.
+    let text = serde_json::to_vec(request).unwrap_or_default();
+    hex(&Sha256::digest(text)[..8])
 }
 
 fn expect(schema: &str, known: &str) -> DataResult<()> {
