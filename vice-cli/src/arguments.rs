@@ -67,6 +67,10 @@ pub(crate) enum Command {
     Overlay(Box<commands::overlay::Args>),
     /// Hold results side by side, label by label.
     Compare(commands::compare::Args),
+    /// Evaluate many flights by one manifest; `collect` makes one table of the results.
+    Batch(Box<commands::batch::Args>),
+    /// Show the results of a batch as the paper's table.
+    Table(commands::table::Args),
     /// Measure how fast points are projected here, beside the machine's limit.
     Bench(commands::bench::Args),
     /// Print completions for a shell.

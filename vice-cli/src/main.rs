@@ -5,6 +5,7 @@ mod arguments;
 mod commands;
 mod inputs;
 mod outputs;
+mod signals;
 mod terminal;
 
 use std::process::ExitCode;
@@ -39,6 +40,8 @@ fn main() -> ExitCode {
         Command::Report(args) => commands::report::run(args, verbosity),
         Command::Overlay(args) => commands::overlay::run(args, verbosity),
         Command::Compare(args) => commands::compare::run(args),
+        Command::Batch(args) => commands::batch::run(args, verbosity),
+        Command::Table(args) => commands::table::run(args),
         Command::Bench(args) => commands::bench::run(args, verbosity),
         Command::Completions(args) => commands::completions::run(args, Cli::command()),
     };
@@ -46,6 +49,8 @@ fn main() -> ExitCode {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::TooManySkips) => ExitCode::from(3),
         Ok(Outcome::RequirementBroken) => ExitCode::from(4),
+        Ok(Outcome::RunsFailed) => ExitCode::FAILURE,
+        Ok(Outcome::Interrupted) => ExitCode::from(signals::INTERRUPTED),
         Err(error) if terminal::is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             terminal::print_error(&error);

@@ -23,6 +23,10 @@ pub(crate) enum Outcome {
     TooManySkips,
     /// Done, but a limit that was required is broken.
     RequirementBroken,
+    /// The rest is done, but some runs of a batch failed.
+    RunsFailed,
+    /// A signal ended it before all was done.
+    Interrupted,
 }
 
 /// Options that do not fit together or the data: exit code 2.
@@ -62,6 +66,16 @@ impl Verbosity {
         let style = ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len} {eta}")
             .unwrap_or_else(|_| ProgressStyle::default_bar());
         ProgressBar::new(0).with_style(style).with_message(what)
+    }
+
+    /// A bar over the runs of a batch, with what `{msg}` says of failures.
+    pub(crate) fn runs_bar(self) -> ProgressBar {
+        let bar = self.progress("");
+        let template = "{pos}/{len} [{bar:30}] {per_sec} {eta} left, {msg} failed";
+        bar.with_style(
+            ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
+        )
+        .with_message("0")
     }
 
     /// A remark that is neither a result nor a warning.

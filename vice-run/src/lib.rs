@@ -18,6 +18,7 @@
 //! Nothing here prints, and nothing knows a command line.
 #![forbid(unsafe_code)]
 
+pub mod batch;
 pub mod bench;
 pub mod conversion;
 pub mod demo;

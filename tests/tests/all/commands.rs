@@ -200,6 +200,8 @@ fn each_command_has_help_with_an_example() {
         "report",
         "overlay",
         "compare",
+        "batch",
+        "table",
     ] {
         let help = good(vice(&[command, "--help"]));
         assert!(help.contains("Example"), "{command}: {help}");

@@ -21,6 +21,7 @@ mod detect_rendered;
 mod diagnose;
 mod euroc_oracle;
 mod evaluate_oracle;
+mod fleet;
 mod locobot_oracle;
 mod plugin_check;
 mod plugin_hostile;

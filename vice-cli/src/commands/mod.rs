@@ -1,6 +1,8 @@
 //! One file a command.
 
 pub(crate) mod annotate;
+pub(crate) mod batch;
+pub(crate) mod batch_collect;
 pub(crate) mod bench;
 pub(crate) mod compare;
 pub(crate) mod completions;
@@ -19,4 +21,5 @@ pub(crate) mod plugin;
 pub(crate) mod report;
 pub(crate) mod sensitivity;
 pub(crate) mod synth;
+pub(crate) mod table;
 pub(crate) mod trajectory;

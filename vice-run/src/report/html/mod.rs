@@ -69,6 +69,11 @@ pub fn render(runs: &[Run]) -> RunResult<String> {
     Ok(page::page(&title, &content, &data))
 }
 
+/// A page around content that is no run's.
+pub(crate) fn bare_page(title: &str, content: &Markup) -> String {
+    page::page(title, content, &[])
+}
+
 fn section(run: &Run, place: usize, alone: bool) -> Markup {
     let document = &run.document;
     let marks = Marks::of(document, None);

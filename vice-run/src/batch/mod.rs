@@ -1,0 +1,29 @@
+//! Many flights by one manifest.
+//!
+//! A [`Manifest`] is a table of requests; [`run()`] evaluates what is not there yet into a folder, [`collect`] makes one
+//! table of it, and [`fleet_table`] shows that as the paper's. The same manifest gives the same bytes on one machine, in
+//! shards, and after any interruption. `docs/fleet.md` describes the folder.
+
+mod cells;
+pub mod collect;
+mod content;
+mod csv_rows;
+mod field;
+pub mod fleet_table;
+mod glob;
+mod grid;
+mod key;
+mod manifest;
+mod markup;
+mod paths;
+pub mod results;
+mod run;
+pub mod scan;
+mod store;
+mod toml_rows;
+
+pub use content::Hashes;
+pub use key::Key;
+pub use manifest::{Manifest, Row};
+pub use run::{Event, Options, Planned, Shard, State, Summary, plan, run};
+pub use store::{RowRecord, Store};
