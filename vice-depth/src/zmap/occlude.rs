@@ -5,8 +5,8 @@
 //! nearest at its pixel, where the point's own ray meets that patch: a floor seen at a grazing angle does not hide
 //! itself, though its depth changes much from one pixel to the next.
 //!
-//! A surface so near that its points lie further apart than the widest triangle that is trusted answers no pixel, and
-//! takes none from what is behind it: a few stray points before the lens would black out a tenth of the image.
+//! Points just before the lens that lie further apart than the widest triangle that is trusted answer no pixel, and take
+//! none from what is behind them: a few strays would black out a tenth of the image.
 //!
 //! What a point's fate depends on lies within the largest disc's radius of it, so that a part of the image can be
 //! answered without the rest.
@@ -46,6 +46,9 @@ const MAX_TILT: f64 = 6.0;
 /// Points that are kept between the two passes (80 MB); more are projected a second time.
 const MOST_KEPT: usize = 2_000_000;
 
+/// Sparse points nearer than this are strays, metres: no robot looks at a wall from there.
+const STRAYS_M: f64 = 0.5;
+
 /// Width of a cell of the z-buffer, pixels.
 pub(super) fn cell_px(camera: &Camera) -> f64 {
     (focal_px(camera) / CELLS_PER_FOCAL_LENGTH).max(1.0)
@@ -61,7 +64,7 @@ pub(super) struct Occlusion<'a> {
     view: &'a View<'a>,
     cell_px: f64,
     focal_px: f64,
-    /// Distance between points over their depth, beyond which they are no surface.
+    /// Distance between points over their depth, beyond which points before the lens are no surface.
     sparsest: f64,
 }
 
@@ -116,9 +119,9 @@ impl<'a> Occlusion<'a> {
         (buffer, kept)
     }
 
-    /// Depth that points of a leaf must be beyond to be dense enough for a surface.
+    /// Depth that points of a leaf must be beyond to be dense enough for a surface, or too far off to be strays.
     fn nearest_m(&self, leaf: &Leaf) -> f64 {
-        self.view.patch(leaf.index).spacing_m / self.sparsest
+        (self.view.patch(leaf.index).spacing_m / self.sparsest).min(STRAYS_M)
     }
 
     /// Radius of a disc of a patch at a depth.
