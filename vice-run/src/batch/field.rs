@@ -53,7 +53,7 @@ enum Kind {
 }
 
 /// Options, where they stand in a request, and what they hold.
-const FIELDS: [(&str, &str, Kind); 31] = [
+const FIELDS: [(&str, &str, Kind); 32] = [
     ("dataset", "dataset.path", Kind::Text),
     ("format", "dataset.format", Kind::Text),
     ("set", "dataset.set", Kind::Settings),
@@ -79,6 +79,7 @@ const FIELDS: [(&str, &str, Kind); 31] = [
     ("initial-pose", "streams.initial_pose", Kind::Numbers),
     ("depth", "depth.sources", Kind::Texts),
     ("zmap-occlusion", "depth.zmap_occlusion", Kind::Switch),
+    ("zmap-interpolation", "depth.zmap_interpolation", Kind::Text),
     ("cloud-voxel", "depth.cloud_voxel_m", Kind::Number),
     ("zcam-range", "depth.zcam_range_m", Kind::Numbers),
     ("tag-size", "depth.tag_size_m", Kind::Number),
@@ -195,6 +196,7 @@ fn insert(object: &mut Map<String, Value>, path: &[&str], value: Value) -> Resul
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::request::tests::everything;
 
     #[test]
     fn a_column_is_named_as_the_option_or_as_the_request_has_it() {
@@ -211,6 +213,7 @@ mod tests {
             ("labels.observations", _) => "all",
             ("streams.estimate_as", _) => "wxyz",
             ("depth.sources", _) => "floor",
+            ("depth.zmap_interpolation", _) => "natural",
             ("depth.tag_family", _) => "36h11",
             ("scoring.align", _) => "yaw",
             ("dataset.floor_plane", _) => "0,0,1,0",
@@ -229,9 +232,10 @@ mod tests {
         let request: Request = serde_json::from_value(Value::Object(request)).unwrap();
         assert_eq!(request.dataset.set["a"], "b");
         // Whatever a command line can say, a column can: each option of the one is a field of the other.
-        let words = request.command_line();
-        for option in words.split(" --").skip(1).filter_map(|w| w.split(' ').next()) {
-            assert!(fields().any(|f| f.0 == option), "{option}");
+        for words in [request.command_line(), everything().command_line()] {
+            for option in words.split(" --").skip(1).filter_map(|w| w.split(' ').next()) {
+                assert!(fields().any(|f| f.0 == option), "{option}");
+            }
         }
     }
 }

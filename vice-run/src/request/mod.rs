@@ -354,4 +354,4 @@ impl DepthSpec {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

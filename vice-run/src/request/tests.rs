@@ -2,7 +2,7 @@ use vice_core::error::ErrorKind;
 
 use super::*;
 
-fn everything() -> Request {
+pub(crate) fn everything() -> Request {
     let mut request = Request::new(
         "my run",
         "labels.csv",
