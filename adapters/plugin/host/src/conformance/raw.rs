@@ -119,6 +119,23 @@ impl Check<'_> {
         }
     }
 
+    /// The code of a call for a place that is not there, and whether it left a message.
+    fn outside(
+        &mut self,
+        library: &Library,
+        call: &str,
+        place: usize,
+        make: impl FnOnce(*mut Message) -> i32,
+    ) -> (i32, bool) {
+        self.step(format!("`{call}` for place {place}, which is not there"));
+        let mut bytes = [0; 512];
+        let mut message = message(&mut bytes);
+        let turn = library.turn();
+        let code = make(&raw mut message);
+        drop(turn);
+        (code, message.length > 0)
+    }
+
     fn is_not_given(
         &mut self,
         library: &Library,
@@ -126,12 +143,7 @@ impl Check<'_> {
         place: usize,
         make: impl FnOnce(*mut Message) -> i32,
     ) {
-        self.step(format!("`{call}` for place {place}, which is not there"));
-        let mut bytes = [0; 512];
-        let mut message = message(&mut bytes);
-        let turn = library.turn();
-        let code = make(&raw mut message);
-        drop(turn);
+        let (code, _) = self.outside(library, call, place, make);
         match code {
             contract::OK => self.fault(format!("`{call}` gives something for place {place}, which is not there")),
             contract::EXCEPTION => self.fault(format!(
@@ -148,14 +160,9 @@ impl Check<'_> {
         place: usize,
         make: impl FnOnce(*mut Message) -> i32,
     ) {
-        self.step(format!("`{call}` for place {place}, which is not there"));
-        let mut bytes = [0; 512];
-        let mut message = message(&mut bytes);
-        let turn = library.turn();
-        let code = make(&raw mut message);
-        drop(turn);
+        let (code, says_why) = self.outside(library, call, place, make);
         match code {
-            code if kind(code).is_some() && message.length > 0 => {}
+            code if kind(code).is_some() && says_why => {}
             // Left to the stored file, which was asked for beyond the last frame already.
             contract::NONE if call == "image" && library.calls.optional.image_file.is_some() => {}
             code if kind(code).is_some() => self.fault(format!("`{call}` for place {place} fails without a message")),
