@@ -64,6 +64,11 @@ impl Fit {
         theta
     }
 
+    /// Where a parameter stands among those that are solved for.
+    pub(super) fn place_of(&self, parameter: usize) -> Option<usize> {
+        self.parameters.iter().position(|p| *p == parameter)
+    }
+
     pub(super) fn linearised_at(&self) -> Vec<f64> {
         self.parameters.iter().map(|p| self.theta[*p]).collect()
     }

@@ -194,7 +194,7 @@ impl Reporter<'_, '_, '_> {
         let effects: Vec<f64> = flaw
             .solved()
             .filter_map(|p| {
-                let i = fit.parameters.iter().position(|q| *q == p)?;
+                let i = fit.place_of(p)?;
                 Some(PARAMETERS[p].typical * self.work.rms(&fit.columns[i]))
             })
             .collect();

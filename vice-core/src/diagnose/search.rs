@@ -227,7 +227,7 @@ fn sized(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
     // To the end: a pair that starts from here must not win by better sizes.
     let first = work.sized(fits[best].clone(), 5);
     let limit = first.score - CLOSE;
-    let mut fits: Vec<Fit> = fits
+    let fits: Vec<Fit> = fits
         .into_par_iter()
         .enumerate()
         .map(|(i, fit)| {
@@ -241,14 +241,12 @@ fn sized(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
         })
         .collect();
     let limit = best_score(&fits) - CLOSE;
-    fits = fits
-        .into_par_iter()
+    fits.into_par_iter()
         .map(|fit| {
             let settled = fit.score < limit || is_beside(&fit, first.solution.likelihood);
             if settled { fit } else { work.sized(fit, 1) }
         })
-        .collect();
-    fits
+        .collect()
 }
 
 /// With jumps, those that are close.
@@ -258,15 +256,18 @@ fn jumping(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
     let first = work.with_jumps(fits[best].clone(), MOST_JUMPS);
     fits.into_par_iter()
         .enumerate()
-        .map(|(i, fit)| match fit.score > close {
-            _ if i == best => first.clone(),
-            // The same frames are worst where the same is left.
-            true if is_beside(&fit, likelihood) => {
+        .map(|(i, fit)| {
+            if i == best {
+                first.clone()
+            } else if fit.score <= close {
+                fit
+            } else if is_beside(&fit, likelihood) {
+                // The same frames are worst where the same is left.
                 let (logs, jumps) = (first.logs, first.jumps.clone());
                 work.rescored(Fit { logs, jumps, jump_gain: first.jump_gain, ..fit })
+            } else {
+                work.with_jumps(fit, MOST_JUMPS)
             }
-            true => work.with_jumps(fit, MOST_JUMPS),
-            false => fit,
         })
         .collect()
 }

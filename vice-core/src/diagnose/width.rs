@@ -25,13 +25,9 @@ fn half_width(flaw: Flaw) -> f64 {
     }
 }
 
-fn place(fit: &Fit, parameter: usize) -> Option<usize> {
-    fit.parameters.iter().position(|p| *p == parameter)
-}
-
 /// Half the width of the interval of one parameter; zero if it is not solved for.
 pub(super) fn half(fit: &Fit, flaw: Flaw, parameter: usize) -> f64 {
-    let variance = place(fit, parameter).map_or(0.0, |i| fit.solution.covariance[(i, i)].max(0.0));
+    let variance = fit.place_of(parameter).map_or(0.0, |i| fit.solution.covariance[(i, i)].max(0.0));
     half_width(flaw) * variance.sqrt()
 }
 
@@ -44,7 +40,7 @@ pub(super) fn length(fit: &Fit, flaw: Flaw) -> Option<(f64, f64)> {
         _ => return None,
     };
     let first = flaw.parameters().start;
-    let places: Vec<usize> = (first..first + numbers).map(|p| place(fit, p)).collect::<Option<_>>()?;
+    let places: Vec<usize> = (first..first + numbers).map(|p| fit.place_of(p)).collect::<Option<_>>()?;
     let values = fit.values();
     let x: Vec<f64> = (0..numbers).map(|i| values[first + i]).collect();
     let length = x.iter().map(|v| v * v).sum::<f64>().sqrt();
