@@ -147,7 +147,7 @@ fn run_all(
             let _ = terminal::print(&json_line(event, begun.elapsed().as_secs_f64()));
         } else {
             bar.set_length(summary.total as u64);
-            bar.set_position((summary.total - summary.left()) as u64);
+            bar.set_position(summary.ended() as u64);
             bar.set_message(summary.failed.to_string());
         }
         if let Some(error) = &event.record.error {
@@ -169,7 +169,7 @@ fn told(summary: &Summary, seconds: f64) -> String {
         "{} of {} runs evaluated in {seconds:.1} s ({:.1} a second), {} were there, {} failed",
         summary.done,
         summary.total,
-        (summary.done + summary.failed) as f64 / seconds.max(1e-9),
+        summary.rate(seconds),
         summary.skipped,
         summary.failed
     );
@@ -187,8 +187,7 @@ fn json_line(event: &Event<'_>, elapsed_s: f64) -> String {
         State::Done => "done",
         State::Failed => "failed",
     };
-    let ended = summary.total - summary.left();
-    let rate = (summary.done + summary.failed) as f64 / elapsed_s.max(1e-9);
+    let rate = summary.rate(elapsed_s);
     let line = serde_json::json!({
         "run_id": record.run_id,
         "state": state,
@@ -196,7 +195,7 @@ fn json_line(event: &Event<'_>, elapsed_s: f64) -> String {
         "exit_code": record.exit_code,
         "error": record.error,
         "seconds": record.seconds,
-        "ended": ended,
+        "ended": summary.ended(),
         "total": summary.total,
         "failed": summary.failed,
         "runs_per_second": rate,

@@ -10,7 +10,7 @@ use vice_run::report::html::{IMAGE_BUDGET_BYTES, Run, render};
 use vice_run::report::{self, sample_lines};
 use vice_run::request::Scoring;
 use vice_run::require::{Requirement, broken};
-use vice_run::result::ResultDocument;
+use vice_run::result::{MAX_SKIPPED_PERCENT, ResultDocument};
 
 use super::report::shots;
 use crate::inputs::{EvaluationArgs, on_off};
@@ -52,7 +52,7 @@ struct ScoringArgs {
     #[arg(long, value_name = "on|off", action = clap::ArgAction::Set, value_parser = on_off, conflicts_with = "request")]
     depth_check: Option<bool>,
     /// Exit with 3 if more labels than this could not be scored, percent. What an estimate carries behind the camera is warned of instead.
-    #[arg(long, value_name = "PERCENT", default_value = "10", value_parser = percent)]
+    #[arg(long, value_name = "PERCENT", default_value_t = MAX_SKIPPED_PERCENT, value_parser = percent)]
     max_skipped: f64,
     /// Exit with 4 unless every estimate keeps these limits, such as 'rmse_2d<2px', 'age5s<3px' (five seconds since the key
     /// frame) or 'moved1m<40mm'; px, mrad or mm. The upper end of the 95 % interval has to be below, with rmse_2d.low and so

@@ -1,8 +1,8 @@
 //! A manifest as CSV: a heading of columns, one run a row, and a row `defaults`.
 
-use vice_core::error::{DataError, DataResult, ErrorKind};
+use vice_core::error::DataResult;
 
-use super::cells::{Cells, RawRow};
+use super::cells::{Cells, RawRow, wrong};
 use super::field::{self, Cell, RUN_ID};
 
 /// The run_id of the row that all others start from.
@@ -10,7 +10,6 @@ const DEFAULTS: &str = "defaults";
 
 /// Rows with their lines, and the defaults.
 pub(super) fn read(text: &str) -> DataResult<(Cells, Vec<RawRow>)> {
-    let wrong = |line: u64, what: String| DataError::of_kind(ErrorKind::Usage, what).line(line);
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .comment(Some(b'#'))

@@ -4,6 +4,7 @@ use super::grid::{Grid, HEADS, HELD, grid};
 use super::markup;
 use super::results::ResultRow;
 use crate::error::RunResult;
+use crate::report::csv::finished;
 use crate::report::table::align;
 use crate::text::printable;
 
@@ -80,8 +81,7 @@ fn csv_text(grid: &Grid) -> RunResult<String> {
             writer.write_record(cells)?;
         }
     }
-    let bytes = writer.into_inner().map_err(|e| e.into_error())?;
-    Ok(String::from_utf8(bytes)?)
+    finished(writer)
 }
 
 #[cfg(test)]

@@ -7,14 +7,11 @@ use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::result::{PixelPart, Role};
 
 use crate::error::RunResult;
-use crate::report::csv::cell;
-use crate::result::ResultDocument;
+use crate::report::csv::{cell, finished};
+use crate::result::{MAX_SKIPPED_PERCENT, ResultDocument};
 
 /// Name and version of the columns.
 pub const SCHEMA: &str = "vice.results/1";
-
-/// Share of labels that may be skipped before `vice evaluate` ends with 3, percent.
-const MAX_SKIPPED_PERCENT: f64 = 10.0;
 
 /// A row. No time and no place is in it, so that it is the same wherever the run was made. Names say units; what could
 /// not be had is empty.
@@ -172,8 +169,7 @@ pub fn to_csv(rows: &[impl Serialize]) -> RunResult<String> {
     for row in rows {
         writer.serialize(row)?;
     }
-    let bytes = writer.into_inner().map_err(|e| e.into_error())?;
-    Ok(String::from_utf8(bytes)?)
+    finished(writer)
 }
 
 /// Reads a `results.csv`.

@@ -98,9 +98,19 @@ pub struct Summary {
 }
 
 impl Summary {
+    /// Runs that ended.
+    pub const fn ended(&self) -> usize {
+        self.done + self.skipped + self.failed
+    }
+
     /// Runs that are still to be looked at.
     pub const fn left(&self) -> usize {
-        self.total - self.done - self.skipped - self.failed
+        self.total - self.ended()
+    }
+
+    /// Runs that were tried a second.
+    pub fn rate(&self, seconds: f64) -> f64 {
+        (self.done + self.failed) as f64 / seconds.max(1e-9)
     }
 }
 

@@ -8,6 +8,7 @@ use vice_core::registry::Registry;
 
 use crate::error::RunResult;
 use crate::formats;
+use crate::report::csv::finished;
 use crate::request::{DatasetSpec, IMU_EULER, PluginsSpec};
 
 /// Folders inside of folders that are looked into.
@@ -46,8 +47,7 @@ pub fn scan(folder: &Path, base: &Path) -> RunResult<String> {
         let record = [name, one.format.clone(), shown(&one.path, base), labels, estimates(one, &registry)];
         writer.write_record(record)?;
     }
-    let bytes = writer.into_inner().map_err(|e| e.into_error())?;
-    Ok(String::from_utf8(bytes)?)
+    finished(writer)
 }
 
 fn file_name(path: &Path) -> String {

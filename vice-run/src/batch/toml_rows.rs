@@ -2,15 +2,15 @@
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-use vice_core::error::{DataError, DataResult, ErrorKind};
+use vice_core::error::DataResult;
 
-use super::cells::{Cells, RawRow};
+use super::cells::{Cells, RawRow, wrong};
 use super::field::Cell;
 
 /// Rows with their lines, and the defaults.
 pub(super) fn read(text: &str) -> DataResult<(Cells, Vec<RawRow>)> {
     let line_of = |at: usize| text.bytes().take(at).filter(|b| *b == b'\n').count() as u64 + 1;
-    let wrong = |at: usize, what: String| DataError::of_kind(ErrorKind::Usage, what).line(line_of(at));
+    let wrong = |at: usize, what: String| wrong(line_of(at), what);
     let document = DeTable::parse(text)
         .map_err(|e| wrong(e.span().map_or(0, |s| s.start), format!("is no TOML: {}", e.message())))?;
     let (mut defaults, mut rows) = (Cells::default(), Vec::new());
@@ -68,7 +68,7 @@ fn scalar(value: &Spanned<DeValue<'_>>, column: &str, line: u64) -> DataResult<S
         DeValue::Boolean(false) => "off".to_string(),
         _ => {
             let what = format!("{column}: expected text, a number, true, false, or a list of these");
-            return Err(DataError::of_kind(ErrorKind::Usage, what).line(line));
+            return Err(wrong(line, what));
         }
     })
 }

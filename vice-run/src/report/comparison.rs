@@ -9,7 +9,7 @@ use vice_core::paired::{Paired, paired};
 use vice_core::result::{PixelPart, Role};
 use vice_core::statistics::WithInterval;
 
-use super::csv::cell;
+use super::csv::{cell, finished};
 use super::latex::escape;
 use super::table::align;
 use crate::text::printable;
@@ -253,8 +253,7 @@ pub fn csv(document: &Document) -> RunResult<String> {
         record.push(p.b_nearer_share.to_string());
         writer.write_record(record)?;
     }
-    let bytes = writer.into_inner().map_err(|e| e.into_error())?;
-    Ok(String::from_utf8(bytes)?)
+    finished(writer)
 }
 
 /// A `tabular` to `\input`; it needs the package booktabs.

@@ -74,8 +74,7 @@ pub fn render(document: &ResultDocument) -> RunResult<String> {
             writer.write_record(record)?;
         }
     }
-    let bytes = writer.into_inner().map_err(|e| e.into_error())?;
-    Ok(String::from_utf8(bytes)?)
+    finished(writer)
 }
 
 /// Seconds or metres since the key frame, and the start of the columns' names.
@@ -83,6 +82,12 @@ fn windows() -> Vec<(Option<f64>, Option<f64>, String)> {
     let ages = AGES_S.map(|s| (Some(s), None, format!("age_{s}s")));
     let motions = MOTIONS_M.map(|m| (None, Some(m), format!("moved_{m}m")));
     ages.into_iter().chain(motions).collect()
+}
+
+/// The text of a writer.
+pub(crate) fn finished(writer: csv::Writer<Vec<u8>>) -> RunResult<String> {
+    let bytes = writer.into_inner().map_err(|e| e.into_error())?;
+    Ok(String::from_utf8(bytes)?)
 }
 
 /// Text from data that a spreadsheet would take for a formula is kept from being one.

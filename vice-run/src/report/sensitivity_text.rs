@@ -2,6 +2,7 @@
 
 use vice_core::diagnose::SensitivityDocument;
 
+use super::csv::finished;
 use super::flaw_units::{axis, shown_unit};
 use super::table;
 use crate::error::RunResult;
@@ -60,7 +61,7 @@ pub fn csv(document: &SensitivityDocument) -> RunResult<String> {
             writer.write_record([curve.flaw.name(), &curve.parameter, &size, &rmse])?;
         }
     }
-    Ok(String::from_utf8(writer.into_inner().map_err(|e| e.into_error())?)?)
+    finished(writer)
 }
 
 #[cfg(test)]

@@ -20,6 +20,9 @@ use crate::request::Request;
 /// The schema's name and version.
 pub const SCHEMA: &str = "vice.result/2";
 
+/// Share of labels that may be skipped before `vice evaluate` ends with 3, unless it is told another, percent.
+pub const MAX_SKIPPED_PERCENT: f64 = 10.0;
+
 /// The document.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ResultDocument {
