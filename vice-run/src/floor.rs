@@ -25,7 +25,7 @@ pub fn fit_floor(
     let dataset = opened.dataset.as_ref();
     let found = match at {
         None => {
-            let (cloud, reference) = depth.cloud(DepthName::ZMap, dataset).map_err(|e| {
+            let (cloud, reference) = depth.cloud(DepthName::ZMap, opened).map_err(|e| {
                 RunError::new(e.kind(), "no cloud to fit to")
                     .advise("name a frame with `at` to use its depth image")
                     .because(e)

@@ -39,6 +39,7 @@ pub mod report;
 pub mod request;
 pub mod require;
 pub mod result;
+pub mod scans;
 pub mod scene;
 pub mod sources;
 pub mod streams;

@@ -15,6 +15,7 @@ use vice_files::calibration::CalibrationFile;
 use crate::error::{RunError, RunResult};
 use crate::formats;
 use crate::request::{DatasetSpec, Protocol};
+use crate::scans::Scans;
 
 /// A recording as it is used.
 #[derive(Clone)]
@@ -29,6 +30,8 @@ pub struct Opened {
     pub frames: Arc<[Stamp]>,
     /// The calibration file, where one was given.
     pub calibration: Option<CalibrationFile>,
+    /// Scans that other runs may have read already, where several runs are made.
+    pub scans: Option<Arc<Scans>>,
 }
 
 impl DatasetSpec {
@@ -93,7 +96,14 @@ impl DatasetSpec {
             dataset.format(),
             frames.len()
         );
-        Ok(Opened { dataset: Arc::new(calibrated), camera_name: name, camera, frames, calibration })
+        Ok(Opened {
+            dataset: Arc::new(calibrated),
+            camera_name: name,
+            camera,
+            frames,
+            calibration,
+            scans: None,
+        })
     }
 
     /// The name of the camera that was asked for, or the first.

@@ -69,7 +69,7 @@ impl DepthSpec {
         match name {
             DepthName::Floor => Ok(Box::new(FloorDepth::new())),
             DepthName::ZMap => {
-                let (cloud, reference) = self.cloud(name, dataset.as_ref())?;
+                let (cloud, reference) = self.cloud(name, opened)?;
                 let occlusion = self.zmap_occlusion.unwrap_or(true);
                 let interpolation = self.zmap_interpolation.unwrap_or_default().into();
                 let options = ZMapOptions { occlusion, interpolation, ..ZMapOptions::default() };
@@ -105,10 +105,14 @@ impl DepthSpec {
     ///
     /// # Errors
     /// [`RunError`] if it has none for this source, or it cannot be read.
-    pub fn cloud(&self, source: DepthName, dataset: &dyn Dataset) -> RunResult<(Arc<Cloud>, CloudRef)> {
-        let reference = cloud_of(source, dataset)?;
+    pub fn cloud(&self, source: DepthName, opened: &Opened) -> RunResult<(Arc<Cloud>, CloudRef)> {
+        let reference = cloud_of(source, opened.dataset.as_ref())?;
         let options = CloudOptions { voxel_m: self.cloud_voxel_m, ..CloudOptions::default() };
-        Ok((load_cloud(&reference, &options)?, reference))
+        let cloud = match &opened.scans {
+            Some(scans) => scans.load(&reference, &options)?,
+            None => load_cloud(&reference, &options)?,
+        };
+        Ok((cloud, reference))
     }
 }
 

@@ -91,6 +91,16 @@ impl Hashes {
         Ok(content)
     }
 
+    /// What makes two files the same scan: their content, or for one that is not hashed whole also where it lies.
+    pub(super) fn identity(&self, path: &Path) -> Option<String> {
+        let content = self.of(path).ok()?;
+        if content.sampled {
+            Some(format!("{} {}", content.hash, path.display()))
+        } else {
+            Some(content.hash)
+        }
+    }
+
     fn folder(&self, path: &Path) -> io::Result<Content> {
         let mut files = Vec::new();
         walk(path, DEEPEST, &mut files)?;

@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use vice_core::error::{ErrorKind, one_line};
@@ -18,7 +18,11 @@ use crate::error::{RunError, RunResult};
 use crate::evaluation::{Samples, silent};
 use crate::request::Request;
 use crate::result::ResultDocument;
+use crate::scans::Scans;
 use crate::text::with_options;
+
+/// Most memory that scans take which are kept for the next run, bytes.
+const SCAN_BYTES: usize = 128 << 20;
 
 /// How a batch is run.
 #[derive(Clone, Copy, Debug)]
@@ -150,7 +154,9 @@ pub fn run(
 ) -> RunResult<Summary> {
     refuse_in_data(manifest, store.folder())?;
     store.prepare(manifest)?;
-    let hashes = Hashes::read(&store.hashes());
+    let hashes = Arc::new(Hashes::read(&store.hashes()));
+    let of_scans = Arc::clone(&hashes);
+    let scans = Arc::new(Scans::new(SCAN_BYTES, move |path| of_scans.identity(path)));
     let rows: Vec<&Row> =
         manifest.rows.iter().enumerate().filter(|(p, _)| options.shard.has(*p)).map(|(_, r)| r).collect();
     let summary = Mutex::new(Summary { total: rows.len(), ..Summary::default() });
@@ -158,7 +164,7 @@ pub fn run(
     let work = || {
         while !stop.load(Ordering::SeqCst) {
             let Some(row) = rows.get(next.fetch_add(1, Ordering::SeqCst)) else { break };
-            match one(row, &manifest.base, store, &hashes, options.retry) {
+            match one(row, &manifest.base, store, &hashes, &scans, options.retry) {
                 Ok((record, state)) => {
                     let mut summary = summary.lock().unwrap_or_else(PoisonError::into_inner);
                     match state {
@@ -214,6 +220,7 @@ fn one(
     base: &Path,
     store: &Store,
     hashes: &Hashes,
+    scans: &Arc<Scans>,
     retry: usize,
 ) -> RunResult<(RowRecord, State)> {
     let begun = Instant::now();
@@ -234,7 +241,7 @@ fn one(
     }
     let mut tries = 0;
     loop {
-        let found = catch_unwind(AssertUnwindSafe(|| evaluated(&row.request, base)));
+        let found = catch_unwind(AssertUnwindSafe(|| evaluated(&row.request, base, scans)));
         match found {
             Ok(Ok(document)) => {
                 store.write_result(&key, &document)?;
@@ -258,9 +265,11 @@ fn written(store: &Store, record: RowRecord, state: State) -> RunResult<(RowReco
 }
 
 /// The document of a request, which says the paths as the manifest does: its bytes do not tell where it was made.
-fn evaluated(request: &Request, base: &Path) -> RunResult<ResultDocument> {
+fn evaluated(request: &Request, base: &Path, scans: &Arc<Scans>) -> RunResult<ResultDocument> {
     let resolved = paths::resolved(request, base);
-    let mut document = resolved.evaluate(&resolved.open()?, Samples::Drop, &silent)?;
+    let mut opened = resolved.open()?;
+    opened.scans = Some(Arc::clone(scans));
+    let mut document = resolved.evaluate(&opened, Samples::Drop, &silent)?;
     document.drop_samples();
     document.request = request.clone();
     Ok(document)
