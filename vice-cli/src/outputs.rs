@@ -44,12 +44,12 @@ impl Outputs {
 
     /// Writes a document as one line of JSON without holding its text; true if it went to standard output.
     pub(crate) fn write_json(&self, path: &Path, document: &impl serde::Serialize) -> anyhow::Result<bool> {
-        let fill = |out: &mut dyn Write| {
+        let fill = |out: &mut (dyn Write + Send)| {
             serde_json::to_writer(&mut *out, document)?;
             out.write_all(b"\n")
         };
         if path == Path::new(STDOUT) {
-            let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+            let mut out = std::io::BufWriter::new(std::io::stdout());
             fill(&mut out).and_then(|()| out.flush())?;
             return Ok(true);
         }

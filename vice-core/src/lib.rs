@@ -25,6 +25,7 @@ pub mod depth_doubt;
 pub mod diagnose;
 pub mod error;
 pub mod evaluate;
+pub mod fleet;
 pub mod frames;
 pub mod imu;
 pub mod label;

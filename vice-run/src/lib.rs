@@ -20,6 +20,7 @@
 
 pub mod batch;
 pub mod bench;
+pub mod columns;
 pub mod conversion;
 pub mod demo;
 pub mod depth_compare;

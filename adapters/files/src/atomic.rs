@@ -33,17 +33,32 @@ impl Overwrite {
 /// [`DataError`] if the file exists and may not be replaced, its folder is missing, or writing fails.
 pub fn write<F>(path: impl AsRef<Path>, overwrite: Overwrite, fill: F) -> DataResult<()>
 where
-    F: FnOnce(&mut dyn Write) -> io::Result<()>,
+    F: FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
 {
     let path = path.as_ref();
-    let failed = |error: io::Error| DataError::new("cannot be written").at(path).because(error);
+    write_and_return(path, overwrite, |out| fill(out).map_err(|e| failed(path, e)))
+}
+
+/// As [`write()`], where `fill` has a result and errors of its own. If it fails there is no file.
+///
+/// # Errors
+/// That of `fill`, or as [`write()`].
+pub fn write_and_return<T, E, F>(path: impl AsRef<Path>, overwrite: Overwrite, fill: F) -> Result<T, E>
+where
+    E: From<DataError>,
+    F: FnOnce(&mut (dyn Write + Send)) -> Result<T, E>,
+{
+    let path = path.as_ref();
+    let failed = |error| failed(path, error);
     match fs::metadata(path) {
-        Ok(meta) if meta.is_dir() => return Err(DataError::new("is a folder, not a file").at(path)),
+        Ok(meta) if meta.is_dir() => return Err(DataError::new("is a folder, not a file").at(path).into()),
         Ok(meta) if !meta.is_file() || path.starts_with("/dev") => {
             let mut device = fs::OpenOptions::new().write(true).open(path).map_err(failed)?;
-            return fill(&mut device).and_then(|()| device.flush()).map_err(failed);
+            let value = fill(&mut device)?;
+            device.flush().map_err(failed)?;
+            return Ok(value);
         }
-        Ok(_) if overwrite == Overwrite::Refuse => return Err(exists(path)),
+        Ok(_) if overwrite == Overwrite::Refuse => return Err(exists(path).into()),
         _ => {}
     }
     // A link keeps pointing where it points: what it names is replaced, not the link.
@@ -55,11 +70,12 @@ where
     if !folder.is_dir() {
         return Err(DataError::new("cannot be written: its folder does not exist")
             .at(path)
-            .hint(format!("create {} first", folder.display())));
+            .hint(format!("create {} first", folder.display()))
+            .into());
     }
     let temporary = new_file_beside(&folder).map_err(failed)?;
     let mut writer = BufWriter::with_capacity(1 << 16, temporary);
-    fill(&mut writer).map_err(failed)?;
+    let value = fill(&mut writer)?;
     let temporary = writer.into_inner().map_err(|e| failed(e.into_error()))?;
     temporary.as_file().sync_all().map_err(failed)?;
     let persisted = match overwrite {
@@ -67,10 +83,14 @@ where
         Overwrite::Refuse => temporary.persist_noclobber(&target),
     };
     match persisted {
-        Ok(_) => Ok(()),
-        Err(e) if e.error.kind() == io::ErrorKind::AlreadyExists => Err(exists(path)),
-        Err(e) => Err(failed(e.error)),
+        Ok(_) => Ok(value),
+        Err(e) if e.error.kind() == io::ErrorKind::AlreadyExists => Err(exists(path).into()),
+        Err(e) => Err(failed(e.error).into()),
     }
+}
+
+fn failed(path: &Path, error: io::Error) -> DataError {
+    DataError::new("cannot be written").at(path).because(error)
 }
 
 fn exists(path: &Path) -> DataError {

@@ -8,6 +8,7 @@ use std::sync::OnceLock;
 use std::time::Duration;
 
 use serde_json::Value;
+use vice_core::random::SplitMix;
 use vice_tests::{shared, vice_in, vice_program};
 
 /// A short flight that all tests here read.
@@ -24,12 +25,19 @@ fn flight() -> &'static Path {
 
 /// A manifest beside the flight, of runs that differ in where they start.
 fn manifest(name: &str, runs: usize) -> PathBuf {
-    let mut text = String::from(
-        "run_id,group,dataset,labels,estimate,depth,start\n\
-         defaults,g,flight,flight/labels/scene.csv,\"imu-euler,flight/estimates/drift.txt\",\"floor,zmap\",\n",
-    );
+    manifest_with(name, runs, "scene.csv,\"imu-euler,flight/estimates/drift.txt\",\"floor,zmap\",on")
+}
+
+/// The same of runs that take no time.
+fn quick_manifest(name: &str, runs: usize) -> PathBuf {
+    manifest_with(name, runs, "floor.csv,flight/estimates/drift.txt,floor,off")
+}
+
+fn manifest_with(name: &str, runs: usize, asked: &str) -> PathBuf {
+    let mut text = String::from("run_id,group,dataset,labels,estimate,depth,depth-check,start\n");
+    text.push_str(&format!("defaults,g,flight,flight/labels/{asked},\n"));
     for k in 0..runs {
-        text.push_str(&format!("run{k:03},g{},,,,,{}\n", k % 3, k as f64 * 0.001));
+        text.push_str(&format!("run{k:03},g{},,,,,,{}\n", k % 3, k as f64 * 0.001));
     }
     let path = flight().join(name);
     fs::write(&path, text).unwrap();
@@ -41,12 +49,15 @@ fn batch(manifest: &Path, out: &Path, more: &[&str]) -> vice_tests::Run {
     vice_in(flight(), &[&fixed[..], more].concat())
 }
 
-/// `results.csv`, and all results by the names of their files.
+/// `results.csv`, and all results, samples and tables by the names of their files.
 fn bytes(out: &Path) -> (String, BTreeMap<String, Vec<u8>>) {
-    let run = vice_in(flight(), &["batch", "collect", out.to_str().unwrap()]);
+    let formats = ["--format", "csv,parquet,latex,html"];
+    let run = vice_in(flight(), &[&["batch", "collect", out.to_str().unwrap()][..], &formats].concat());
     assert_eq!(run.code, 0, "{}", run.stderr);
     let runs = fs::read_dir(out.join("runs")).unwrap().map(|e| e.unwrap().path());
-    let runs = runs.filter(|p| p.extension().is_some_and(|e| e == "json"));
+    // What a killed run had begun to write is none of its results.
+    let runs = runs.filter(|p| !p.file_name().is_some_and(|n| n.to_string_lossy().starts_with(".vice-")));
+    let runs = runs.chain(["results.parquet", "table.tex", "table.html"].map(|name| out.join(name)));
     let files = runs.map(|p| (p.file_name().unwrap().to_string_lossy().into_owned(), fs::read(&p).unwrap()));
     (fs::read_to_string(out.join("results.csv")).unwrap(), files.collect())
 }
@@ -62,7 +73,8 @@ fn shards_in_any_order_are_one_batch() {
         assert_eq!(run.code, 0, "{}", run.stderr);
     }
     let (one, four) = (bytes(&whole), bytes(&parts));
-    assert_eq!(one.1.len(), 11);
+    // A result and its samples for each, and three tables.
+    assert_eq!(one.1.len(), 2 * 11 + 3);
     // A heading; two estimates and the reference with two depth sources each.
     assert_eq!(one.0.lines().count(), 1 + 11 * 3 * 2);
     assert_eq!(one, four);
@@ -73,18 +85,19 @@ fn shards_in_any_order_are_one_batch() {
 
 #[test]
 fn a_batch_that_is_killed_goes_on_where_it_was() {
-    let manifest = manifest("killed.csv", 24);
+    let manifest = quick_manifest("killed.csv", 120);
     let folder = tempfile::tempdir().unwrap();
     let (whole, killed) = (folder.path().join("whole"), folder.path().join("killed"));
     assert_eq!(batch(&manifest, &whole, &[]).code, 0);
-    for k in 0..8_u64 {
+    let mut random = SplitMix::new(19);
+    for _ in 0..50 {
         let mut child = Command::new(vice_program())
             .current_dir(flight())
             .args(["batch", manifest.to_str().unwrap(), "--out", killed.to_str().unwrap()])
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        std::thread::sleep(Duration::from_millis(20 + k * k * 17 % 130));
+        std::thread::sleep(Duration::from_millis(5 + random.below(120)));
         child.kill().unwrap();
         child.wait().unwrap();
     }
@@ -96,7 +109,7 @@ fn a_batch_that_is_killed_goes_on_where_it_was() {
 #[cfg(unix)]
 #[test]
 fn a_signal_ends_a_batch_cleanly() {
-    let manifest = manifest("signal.csv", 400);
+    let manifest = quick_manifest("signal.csv", 600);
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let child = Command::new(vice_program())
@@ -114,8 +127,45 @@ fn a_signal_ends_a_batch_cleanly() {
     assert!(run.stderr.contains("are left: run the same again"), "{}", run.stderr);
     for entry in fs::read_dir(out.join("runs")).unwrap() {
         let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "parquet") {
+            continue;
+        }
         serde_json::from_slice::<Value>(&fs::read(&path).unwrap()).unwrap();
     }
+}
+
+#[test]
+fn samples_and_reports_are_kept_where_they_are_asked_for() {
+    let csv = manifest("same.csv", 3);
+    let folder = tempfile::tempdir().unwrap();
+    let (one, two) = (folder.path().join("one"), folder.path().join("two"));
+    assert_eq!(batch(&csv, &one, &["--reports"]).code, 0);
+    assert!(!bytes(&one).0.is_empty());
+    assert_eq!(fs::read_dir(one.join("reports")).unwrap().count(), 3);
+    let page = fs::read_to_string(one.join("table.html")).unwrap();
+    let link = page.split("href=\"").nth(1).unwrap().split('"').next().unwrap().to_string();
+    assert!(one.join(&link).is_file(), "{link}");
+    let collected = vice_in(
+        flight(),
+        &["batch", "collect", one.to_str().unwrap(), "--format", "parquet", "--samples", "parquet"],
+    );
+    assert_eq!(collected.code, 0, "{}", collected.stderr);
+    let samples = fs::read_dir(one.join("samples")).unwrap().count();
+    assert_eq!(samples, 3);
+    let elsewhere = folder.path().join("results.parquet");
+    fs::copy(one.join("results.parquet"), &elsewhere).unwrap();
+    let of_file = vice_in(flight(), &["table", elsewhere.to_str().unwrap()]);
+    let of_folder = vice_in(flight(), &["table", one.to_str().unwrap()]);
+    assert_eq!(of_file.code, 0, "{}", of_file.stderr);
+    assert!(of_folder.stdout.contains("at the labels that both scored"), "{}", of_folder.stdout);
+    assert!(of_file.stdout.contains("each at its own labels"), "{}", of_file.stdout);
+    // Without samples nothing but what needs them is missing.
+    assert_eq!(batch(&csv, &two, &["--samples", "none"]).code, 0);
+    let run = vice_in(flight(), &["batch", "collect", two.to_str().unwrap(), "--samples", "parquet"]);
+    assert!(run.code == 1 && run.stderr.contains("samples of run000 were not kept"), "{}", run.stderr);
+    assert_eq!(fs::read(one.join("results.csv")).unwrap(), fs::read(two.join("results.csv")).unwrap());
+    let again = batch(&csv, &two, &[]);
+    assert!(again.code == 0 && again.stderr.contains("3 of 3 runs evaluated"), "{}", again.stderr);
 }
 
 #[test]
@@ -158,7 +208,7 @@ fn a_bad_run_is_a_row_and_tried_again() {
     let again = batch(&manifest, &out, &["--keep-going"]);
     assert_eq!(again.code, 0, "{}", again.stderr);
     assert!(again.stderr.contains("1 of 4 runs evaluated"), "{}", again.stderr);
-    assert!(bytes(&out).0.contains("\nvice.results/1,late,,flight,"));
+    assert!(bytes(&out).0.contains("\nvice.results/2,late,,late,flight,"));
 }
 
 #[test]
@@ -194,7 +244,7 @@ fn what_is_wrong_with_a_manifest_is_one_line_and_nothing_is_written() {
     let text = "run_id,dataset,labels,estimate,fps\nb,flight,flight/labels/floor.csv,imu-euler,2\na,flight,flight/labels/floor.csv,imu-euler,2\n";
     fs::write(&manifest, text).unwrap();
     assert_eq!(batch(&manifest, &out, &["--shard", "1/2"]).code, 0);
-    assert!(bytes(&out).0.contains("vice.results/1,a,,flight,,missing,"), "{}", bytes(&out).0);
+    assert!(bytes(&out).0.contains("vice.results/2,a,,a,flight,,missing,"), "{}", bytes(&out).0);
     let table = vice_in(flight(), &["table", flight().to_str().unwrap()]);
     assert!(table.code == 1 && table.stderr.contains("is no folder of a batch"), "{}", table.stderr);
 }

@@ -22,6 +22,7 @@ mod diagnose;
 mod euroc_oracle;
 mod evaluate_oracle;
 mod fleet;
+mod fleet_cluster;
 mod locobot_oracle;
 mod plugin_check;
 mod plugin_hostile;

@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use vice_run::batch::scan::scan;
-use vice_run::batch::{Event, Manifest, Options, Shard, State, Store, Summary, plan, run as run_batch};
+use vice_run::batch::{Event, Keep, Manifest, Options, Shard, State, Store, Summary, plan, run as run_batch};
+use vice_run::columns::HAS_PARQUET;
 use vice_run::files::atomic::{self, Overwrite};
 
 use super::batch_collect;
@@ -39,7 +40,7 @@ enum Command {
 
 #[derive(Debug, clap::Args)]
 struct RunArgs {
-    /// Manifest, .csv or .toml; with --scan the one that is written.
+    /// Manifest, .csv, .toml or .parquet; with --scan the one that is written.
     #[arg(value_name = "MANIFEST", required_unless_present = "scan")]
     manifest: Option<PathBuf>,
     /// Folder of the results; made if it is not there.
@@ -57,6 +58,13 @@ struct RunArgs {
     /// Exit with 0 though runs failed, so that a script goes on: their rows say why.
     #[arg(long)]
     keep_going: bool,
+    /// Keep the scored samples of each run, which the table compares estimators with [default: parquet, where this build
+    /// has it].
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    samples: Option<SamplesAs>,
+    /// Make a report of each run, without pictures, which the table as a page links to.
+    #[arg(long)]
+    reports: bool,
     /// Say what would be run; nothing is run or written.
     #[arg(long, conflicts_with_all = ["jobs", "retry", "keep_going", "progress"])]
     dry_run: bool,
@@ -64,8 +72,24 @@ struct RunArgs {
     #[arg(long, value_enum, value_name = "HOW", default_value = "bar")]
     progress: Progress,
     /// Write a manifest of all data sets below this folder, as CSV; without MANIFEST it is printed.
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["out", "jobs", "shard", "retry", "keep_going", "dry_run", "progress"])]
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["out", "jobs", "shard", "retry", "keep_going", "dry_run", "progress", "samples", "reports"])]
     scan: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum SamplesAs {
+    None,
+    Parquet,
+}
+
+impl RunArgs {
+    fn keep(&self) -> anyhow::Result<Keep> {
+        let samples = self.samples.map_or(HAS_PARQUET, |s| s == SamplesAs::Parquet);
+        if samples && !HAS_PARQUET {
+            return Err(usage("--samples parquet: this vice was built without its feature `parquet`"));
+        }
+        Ok(Keep { samples, reports: self.reports })
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -86,7 +110,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
             let manifest = Manifest::read(manifest)?;
             let store = Store::new(out);
             if runs.dry_run {
-                dry_run(&manifest, &store, runs.shard)
+                dry_run(&manifest, &store, runs.shard, runs.keep()?)
             } else {
                 run_all(&manifest, &store, runs, verbosity)
             }
@@ -112,10 +136,10 @@ fn write_manifest(folder: &Path, manifest: Option<&Path>, verbosity: Verbosity) 
     Ok(Outcome::Done)
 }
 
-fn dry_run(manifest: &Manifest, store: &Store, shard: Shard) -> anyhow::Result<Outcome> {
+fn dry_run(manifest: &Manifest, store: &Store, shard: Shard, keep: Keep) -> anyhow::Result<Outcome> {
     let mut text = String::new();
     let mut wrong = false;
-    for planned in plan(manifest, store, shard) {
+    for planned in plan(manifest, store, shard, keep) {
         let (state, key) = match &planned.key {
             Ok(key) if planned.is_there => ("there", key.to_string()),
             Ok(key) => ("to run", key.to_string()),
@@ -137,7 +161,7 @@ fn run_all(
     signals::stop_at_first(&STOP, verbosity)?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = args.jobs.map_or(cores, usize::from);
-    let options = Options { jobs, shard: args.shard, retry: usize::from(args.retry) };
+    let options = Options { jobs, shard: args.shard, retry: usize::from(args.retry), keep: args.keep()? };
     let begun = Instant::now();
     let bar = verbosity.runs_bar();
     let tell = |event: &Event<'_>| {

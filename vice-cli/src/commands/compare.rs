@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use vice_run::report::comparison::{By, Document, NamedRun, csv, latex, text};
+use vice_run::report::comparison::{By, Document, NamedRun, csv, flight_count, latex, text};
 use vice_run::result;
 
 use crate::inputs::to_json;
@@ -13,14 +13,17 @@ use crate::terminal::{self, Outcome, printable, usage};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  vice compare before.json after.json\n  \
     vice compare out.json --by depths --csv depths.csv\n  \
+    vice compare old/*.json new/*.json   (flight by flight, and over all flights)\n  \
     vice compare baseline.json today.json --fail-above 0.5   (for CI: exit code 1 if an estimate got worse by more)\n\n\
     Differences are paired: at each label that both results scored, B minus A. The interval comes from resampling\n\
     points and segments; where it holds zero, the two cannot be told apart by these labels.")]
 pub(crate) struct Args {
-    /// Result documents with their samples, as `vice evaluate --json` writes them; the first is what others are held against.
+    /// Result documents with their samples, as `vice evaluate --json` writes them; the first of a recording
+    /// is what its others are held against.
     #[arg(value_name = "RESULT.json", required = true)]
     results: Vec<PathBuf>,
-    /// What is compared [default: runs; with one result streams, or depths where there is one stream].
+    /// What is compared [default: runs; with one result of each recording
+    /// streams, or depths where there is one stream].
     #[arg(long, value_name = "runs|streams|depths")]
     by: Option<By>,
     /// Seed of the resampling.
@@ -98,7 +101,8 @@ fn fail_above(document: &Document, limit_px: Option<f64>) -> anyhow::Result<()> 
 }
 
 fn default_by(runs: &[NamedRun]) -> By {
-    let [(_, only)] = runs else { return By::Runs };
+    // One result of each recording: what is in it is compared.
+    let Some((_, only)) = runs.first().filter(|_| flight_count(runs) == runs.len()) else { return By::Runs };
     let first = only.pixel.first();
     let several = first.is_some_and(|f| only.pixel.iter().any(|p| p.stream != f.stream || p.role != f.role));
     if several { By::Streams } else { By::Depths }

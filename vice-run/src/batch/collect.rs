@@ -1,11 +1,21 @@
 //! The results of a batch in one table.
 
-use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use vice_files::atomic::{self, Overwrite};
+
+use super::content::hex;
+use super::fleet_table::{self, Beside, render};
 use super::key::Key;
-use super::results::{ResultRow, SCHEMA, to_csv};
+use super::results::{ResultRow, SCHEMA};
+use super::results_file::{results_csv, to_csv, write_parquet};
+use super::samples::{self, PartSamples};
 use super::store::{RowRecord, Store};
-use crate::error::RunResult;
+use crate::columns::{self, Values};
+use crate::error::{RunError, RunResult};
 use crate::report::csv::cell;
 use crate::result;
 
@@ -40,9 +50,10 @@ pub fn collect(store: &Store) -> RunResult<Collected> {
     for listed in store.listed()?.rows {
         let mut common = ResultRow {
             schema: SCHEMA.to_string(),
-            run_id: cell(&listed.run_id),
-            group: cell(&listed.group),
-            dataset: cell(&listed.dataset),
+            run_id: listed.run_id.clone(),
+            group: listed.group.clone(),
+            flight: listed.flight.clone(),
+            dataset: listed.dataset.clone(),
             status: "missing".to_string(),
             ..ResultRow::default()
         };
@@ -57,17 +68,17 @@ pub fn collect(store: &Store) -> RunResult<Collected> {
             continue;
         };
         common.key = record.key.as_ref().map(ToString::to_string).unwrap_or_default();
-        collected.timings.push(Timing { run_id: cell(&listed.run_id), seconds: record.seconds });
+        collected.timings.push(Timing { run_id: listed.run_id.clone(), seconds: record.seconds });
         match (&record.error, &record.key) {
             (None, Some(key)) => {
                 let document = result::read(store.result_path(key))?;
-                collected.rows.extend(ResultRow::of_document(&common, &document));
+                collected.rows.extend(ResultRow::of_document(&common, &document, &listed.estimators));
             }
             (error, _) => {
                 collected.failed += 1;
                 common.status = "failed".to_string();
                 common.exit_code = Some(record.exit_code);
-                common.error = cell(error.as_deref().unwrap_or("has no key"));
+                common.error = error.as_deref().unwrap_or("has no key").to_string();
                 collected.rows.push(common);
             }
         }
@@ -75,20 +86,136 @@ pub fn collect(store: &Store) -> RunResult<Collected> {
     Ok(collected)
 }
 
+/// Where samples come from.
+#[derive(Clone, Copy)]
+pub enum Samples<'a> {
+    /// Nowhere: there is only a table of results.
+    None,
+    /// The folder of a batch, where they were kept.
+    Store(&'a Store),
+}
+
+impl Samples<'_> {
+    /// The samples of a run; nothing where they were not kept or cannot be read.
+    pub(super) fn of(&self, key: &str) -> Option<Vec<PartSamples>> {
+        let Self::Store(store) = self else { return None };
+        // A table of results may have been written by anybody: its keys are no paths.
+        if !key.chars().all(|c| c.is_ascii_alphanumeric() || c == '-') {
+            return None;
+        }
+        samples::read(&store.samples_path(&Key::named(key))).ok()
+    }
+}
+
+/// What a table of a batch is written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// `results.csv` and `timings.csv`.
+    Csv,
+    /// `results.parquet` and `timings.parquet`.
+    Parquet,
+    /// `table.tex`.
+    Latex,
+    /// `table.html`.
+    Html,
+}
+
 impl Collected {
-    /// `results.csv`.
+    /// Writes tables into the batch's folder; all that can go wrong before the first is written does.
     ///
     /// # Errors
-    /// [`RunError`](crate::error::RunError) if a text is none.
-    pub fn results_csv(&self) -> RunResult<String> {
-        to_csv(&self.rows)
+    /// [`RunError`](crate::error::RunError) if one cannot be made or written.
+    pub fn write(&self, store: &Store, formats: &[Format]) -> RunResult<()> {
+        let place = |name: &str| store.folder().join(name);
+        let beside = Beside { samples: Samples::Store(store), links: store.has_reports().then_some("") };
+        let mut texts: Vec<(PathBuf, String)> = Vec::new();
+        for format in formats {
+            match format {
+                Format::Csv => {
+                    texts.push((place("results.csv"), results_csv(&self.rows)?));
+                    texts.push((place("timings.csv"), timings_csv(&self.timings)?));
+                }
+                Format::Latex => {
+                    texts
+                        .push((place("table.tex"), render(&self.rows, &beside, fleet_table::Format::Latex)?));
+                }
+                Format::Html => {
+                    texts
+                        .push((place("table.html"), render(&self.rows, &beside, fleet_table::Format::Html)?));
+                }
+                Format::Parquet => {}
+            }
+        }
+        if formats.contains(&Format::Parquet) {
+            write_parquet(&place("results.parquet"), &self.rows)?;
+            write_timings(&place("timings.parquet"), &self.timings)?;
+        }
+        for (path, text) in texts {
+            atomic::write(path, Overwrite::Replace, |out| out.write_all(text.as_bytes()))?;
+        }
+        Ok(())
     }
 
-    /// `timings.csv`.
+    /// Writes `samples/`: for each run that was done its scored samples, under its name, with columns that tell runs
+    /// apart before those of a sample. Returns how many.
     ///
     /// # Errors
-    /// [`RunError`](crate::error::RunError) if a text is none.
-    pub fn timings_csv(&self) -> RunResult<String> {
-        to_csv(&self.timings)
+    /// [`RunError`](crate::error::RunError) if a run kept none, or a file cannot be written.
+    pub fn write_samples(&self, store: &Store) -> RunResult<usize> {
+        let mut runs: Vec<&ResultRow> = self.rows.iter().filter(|r| r.status == "done").collect();
+        runs.dedup_by_key(|r| &r.run_id);
+        let from = |row: &ResultRow| store.samples_path(&Key::named(&row.key));
+        if let Some(without) = runs.iter().find(|r| !from(r).exists()) {
+            let problem = format!("the samples of {} were not kept", without.run_id);
+            return Err(RunError::missing(problem).advise("run the batch again with its samples kept"));
+        }
+        let folder = store.folder().join("samples");
+        std::fs::create_dir_all(&folder)?;
+        for row in &runs {
+            let names = [("run_id", row.run_id.as_str()), ("group", &row.group), ("flight", &row.flight)];
+            samples::write_named(&from(row), &folder.join(file_name(&row.run_id)), &names)?;
+        }
+        Ok(runs.len())
+    }
+}
+
+fn timings_csv(timings: &[Timing]) -> RunResult<String> {
+    let guarded: Vec<Timing> =
+        timings.iter().map(|t| Timing { run_id: cell(&t.run_id), seconds: t.seconds }).collect();
+    to_csv(&guarded)
+}
+
+fn write_timings(path: &Path, timings: &[Timing]) -> RunResult<()> {
+    let table = vec![
+        (
+            "run_id".to_string(),
+            Values::Text(timings.iter().map(|t| Some(Arc::from(t.run_id.as_str()))).collect()),
+        ),
+        ("seconds".to_string(), Values::Numbers(timings.iter().map(|t| Some(t.seconds)).collect())),
+    ];
+    columns::write(path, &table, |add| Ok(add(&table)?))
+}
+
+/// A name that any file system takes, another for each run: letters that it may not take are replaced, and then a hash
+/// tells the name from others.
+fn file_name(run_id: &str) -> String {
+    let safe = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    let plain: String = run_id.chars().map(|c| if safe(c) { c } else { '_' }).take(80).collect();
+    if plain == run_id && !plain.starts_with('.') {
+        return format!("{plain}.parquet");
+    }
+    format!("_{plain}-{}.parquet", hex(&Sha256::digest(run_id.as_bytes())[..4]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_files_are_safe_and_differ() {
+        assert_eq!(file_name("V1_01_easy"), "V1_01_easy.parquet");
+        let (a, b) = (file_name("a/b"), file_name("a_b"));
+        assert!(a.starts_with("_a_b-") && b == "a_b.parquet", "{a} {b}");
+        assert!(!file_name("../../x").contains('/') && !file_name(".hidden").starts_with('.'));
     }
 }

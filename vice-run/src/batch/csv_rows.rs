@@ -17,7 +17,7 @@ pub(super) fn read(text: &str) -> DataResult<(Cells, Vec<RawRow>)> {
         .flexible(true)
         .from_reader(text.as_bytes());
     let mut heading: Option<csv::StringRecord> = None;
-    let (mut defaults, mut rows) = (Cells::default(), Vec::new());
+    let mut rows = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|e| {
             let line = e.position().map_or(0, csv::Position::line);
@@ -45,15 +45,18 @@ pub(super) fn read(text: &str) -> DataResult<(Cells, Vec<RawRow>)> {
                 cells.add(name, Cell::Text(value.to_string()), line)?;
             }
         }
-        let id = cells.get(RUN_ID).cloned();
-        if id == Some(Cell::Text(DEFAULTS.to_string())) {
-            cells.remove(RUN_ID);
-            defaults = cells;
-        } else {
-            rows.push(RawRow { line, cells });
-        }
+        rows.push(RawRow { line, cells });
     }
-    Ok((defaults, rows))
+    Ok(part_defaults(rows))
+}
+
+/// The row `defaults`, and the others.
+pub(super) fn part_defaults(rows: Vec<RawRow>) -> (Cells, Vec<RawRow>) {
+    let is_defaults = |row: &RawRow| row.cells.get(RUN_ID) == Some(&Cell::Text(DEFAULTS.to_string()));
+    let (defaults, rows): (Vec<RawRow>, Vec<RawRow>) = rows.into_iter().partition(is_defaults);
+    let mut defaults = defaults.into_iter().next_back().map(|row| row.cells).unwrap_or_default();
+    defaults.remove(RUN_ID);
+    (defaults, rows)
 }
 
 /// The line that a record begins in: the reader counts from the end of the one before, blank lines and comments not yet

@@ -15,7 +15,7 @@ pub(super) enum Cell {
 
 impl Cell {
     /// The parts of a list.
-    fn parts(&self) -> Vec<String> {
+    pub(super) fn parts(&self) -> Vec<String> {
         match self {
             Self::List(parts) => parts.clone(),
             Self::Text(text) => {
@@ -92,6 +92,9 @@ const ALIGN: (&str, &str, Kind) = ("align", "scoring.align", Kind::Text);
 /// Columns that are no field of a request.
 pub(super) const RUN_ID: &str = "run_id";
 pub(super) const GROUP: &str = "group";
+pub(super) const FLIGHT: &str = "flight";
+pub(super) const ESTIMATOR: &str = "estimator";
+const NAMES: [&str; 4] = [RUN_ID, GROUP, FLIGHT, ESTIMATOR];
 /// The field that globs are looked for in.
 pub(super) const DATASET: &str = "dataset.path";
 
@@ -99,12 +102,12 @@ fn fields() -> impl Iterator<Item = (&'static str, &'static str, Kind)> {
     FIELDS.into_iter().chain([ALIGN])
 }
 
-/// Where the cells of a column go: `run_id`, `group`, or a place in a request.
+/// Where the cells of a column go: a name that is no field of a request, or a place in one.
 ///
 /// # Errors
 /// What is wrong, in words.
 pub(super) fn place(column: &str) -> Result<String, String> {
-    if [RUN_ID, GROUP].contains(&column) {
+    if NAMES.contains(&column) {
         return Ok(column.to_string());
     }
     for start in ["set.", "dataset.set."] {
@@ -115,7 +118,7 @@ pub(super) fn place(column: &str) -> Result<String, String> {
     let option = column.replace('_', "-");
     let found = fields().find(|(name, place, _)| *name == option || *place == column);
     found.map(|(_, place, _)| place.to_string()).ok_or_else(|| {
-        let known: Vec<&str> = [RUN_ID, GROUP].into_iter().chain(fields().map(|f| f.0)).collect();
+        let known: Vec<&str> = NAMES.into_iter().chain(fields().map(|f| f.0)).collect();
         format!("there is no column `{column}`; known: {}", known.join(", "))
     })
 }
@@ -204,7 +207,11 @@ mod tests {
             assert_eq!(place(name).unwrap(), "streams.max_gap_s");
         }
         assert_eq!(place("set.urdf").unwrap(), "dataset.set.urdf");
-        assert!(place("fsp").unwrap_err().contains("no column `fsp`; known: run_id, group, dataset"));
+        assert!(
+            place("fsp")
+                .unwrap_err()
+                .contains("no column `fsp`; known: run_id, group, flight, estimator, dataset")
+        );
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::results::ResultRow;
 use crate::report::held::value_and_interval;
+use crate::report::numbers::mean;
 use crate::report::rows::{decimals, pixels};
 use crate::text::printable;
 
@@ -15,20 +16,26 @@ pub(super) struct Grid {
     pub(super) without: Vec<(String, String)>,
 }
 
-/// A row of the table.
+/// A row of the table: the runs of an estimator on a flight with a depth source.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Line {
     pub(super) flight: String,
     pub(super) estimate: String,
+    /// Runs that it is the mean of.
+    pub(super) runs: usize,
     /// RMSE_3D in metres, AOE and ROE in radians.
     pub(super) three_d: [Option<f64>; 3],
     pub(super) depth: String,
-    /// Mean and standard deviation for 1, 2 and 3 points: the reference's against the labels.
+    /// Mean and standard deviation for 1, 2 and 3 points: the reference's against the labels. The deviation is that over
+    /// the subsets of the points, or of several runs that over the runs.
     pub(super) reference: [Option<(f64, f64)>; 3],
     /// The estimate's.
     pub(super) on_board: [Option<(f64, f64)>; 3],
-    /// RMSE_2D of the labels that hold, with its interval.
+    /// RMSE_2D of the labels that hold, with its interval; of several runs the mean, and from the lowest end to the
+    /// highest.
     pub(super) held: Option<(f64, Option<[f64; 2]>)>,
+    /// Keys of the runs.
+    pub(super) keys: Vec<String>,
 }
 
 /// Heads of the columns; the six of RMSE_2D stand under "VICE, GT" and "VICE, On-Board".
@@ -56,7 +63,8 @@ pub(super) fn grid(rows: &[ResultRow]) -> Grid {
     for row in rows {
         runs.entry(&row.run_id).or_default().push(row);
     }
-    let mut places: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut groups: Vec<(&str, Vec<Vec<&ResultRow>>)> = Vec::new();
+    let mut places: BTreeMap<(&str, [&str; 3]), (usize, usize)> = BTreeMap::new();
     for row in rows {
         if row.status != "done" {
             let reason = if row.error.is_empty() { &row.status } else { &row.error };
@@ -64,29 +72,78 @@ pub(super) fn grid(rows: &[ResultRow]) -> Grid {
             continue;
         }
         let run = runs.get(row.run_id.as_str()).map_or(&[][..], Vec::as_slice);
-        let is_reference = row.role == "reference";
         // A reference stands in the rows of its estimates, and by itself only where there is none.
-        if is_reference && run.iter().any(|r| r.role == "estimate") {
+        if is_reference(row) && run.iter().any(|r| r.role == "estimate") {
             continue;
         }
-        let reference = run.iter().find(|r| r.role == "reference" && r.depth == row.depth);
-        let interval = row.low_95_px.zip(row.high_95_px).map(|(low, high)| [low, high]);
-        let line = Line {
-            flight: row.run_id.clone(),
-            estimate: row.stream.clone(),
-            three_d: [row.rmse_3d_m, row.aoe_rad, row.roe_rad],
-            depth: row.depth.clone(),
-            reference: reference.map(|r| r.by_points()).unwrap_or_default(),
-            on_board: if is_reference { Default::default() } else { row.by_points() },
-            held: row.held_px.map(|v| (v, interval)),
-        };
-        let place = *places.entry(&row.group).or_insert_with(|| {
-            grid.groups.push((row.group.clone(), Vec::new()));
-            grid.groups.len() - 1
+        let name = (row.group.as_str(), [row.flight.as_str(), &row.estimator, &row.depth]);
+        let (group, line) = *places.entry(name).or_insert_with(|| {
+            let group = groups.iter().position(|(group, _)| *group == name.0).unwrap_or_else(|| {
+                groups.push((name.0, Vec::new()));
+                groups.len() - 1
+            });
+            groups[group].1.push(Vec::new());
+            (group, groups[group].1.len() - 1)
         });
-        grid.groups[place].1.push(line);
+        groups[group].1[line].push(row);
     }
+    let line = |repeated: Vec<&ResultRow>| {
+        let reference = |row: &ResultRow| {
+            let run = runs.get(row.run_id.as_str())?;
+            run.iter().copied().find(|r| is_reference(r) && r.depth == row.depth)
+        };
+        let references: Vec<&ResultRow> = repeated.iter().filter_map(|r| reference(r)).collect();
+        Line::of(&repeated, &references)
+    };
+    grid.groups = groups
+        .into_iter()
+        .map(|(group, lines)| (group.to_string(), lines.into_iter().map(line).collect()))
+        .collect();
     grid
+}
+
+fn is_reference(row: &ResultRow) -> bool {
+    row.role == "reference"
+}
+
+impl Line {
+    /// The line of repeated runs, at least one, and what their references say.
+    fn of(runs: &[&ResultRow], references: &[&ResultRow]) -> Self {
+        let Some(first) = runs.first() else { return Self::default() };
+        let mean_of = |get: fn(&ResultRow) -> Option<f64>| {
+            let values: Vec<f64> = runs.iter().filter_map(|r| get(r)).collect();
+            mean(&values)
+        };
+        let held: Vec<f64> = runs.iter().filter_map(|r| r.held_px).collect();
+        let end = |get: fn(&ResultRow) -> Option<f64>, pick: fn(f64, f64) -> f64| {
+            runs.iter().map(|r| get(r)).collect::<Option<Vec<f64>>>()?.into_iter().reduce(pick)
+        };
+        let (low, high) = (end(|r| r.low_95_px, f64::min), end(|r| r.high_95_px, f64::max));
+        Self {
+            flight: first.flight.clone(),
+            estimate: first.estimator.clone(),
+            runs: runs.len(),
+            three_d: [mean_of(|r| r.rmse_3d_m), mean_of(|r| r.aoe_rad), mean_of(|r| r.roe_rad)],
+            depth: first.depth.clone(),
+            reference: by_points(references),
+            on_board: if is_reference(first) { Default::default() } else { by_points(runs) },
+            held: mean(&held).map(|v| (v, low.zip(high).map(|(low, high)| [low, high]))),
+            keys: runs.iter().map(|r| r.key.clone()).collect(),
+        }
+    }
+}
+
+/// Mean and deviation for 1, 2 and 3 points: of one run as it says, of several over the runs.
+fn by_points(runs: &[&ResultRow]) -> [Option<(f64, f64)>; 3] {
+    if let [one] = runs {
+        return one.by_points();
+    }
+    [0, 1, 2].map(|size| {
+        let means: Vec<f64> = runs.iter().filter_map(|r| r.by_points()[size]).map(|m| m.0).collect();
+        let centre = mean(&means)?;
+        let squares: f64 = means.iter().map(|m| (m - centre).powi(2)).sum();
+        Some((centre, (squares / (means.len() as f64 - 1.0).max(1.0)).sqrt()))
+    })
 }
 
 /// `mean±sd` with as many decimals as are good for something.
@@ -98,7 +155,11 @@ fn mean_and_sd((mean, sd): (f64, f64), plus_minus: &str) -> String {
 impl Line {
     /// The cells behind the group; `none` stands where there is no number.
     pub(super) fn cells(&self, plus_minus: &str, none: &str) -> Vec<String> {
-        let mut cells = vec![printable(&self.flight), printable(&self.estimate)];
+        let estimate = match self.runs {
+            0 | 1 => printable(&self.estimate),
+            runs => format!("{} ({runs} runs)", printable(&self.estimate)),
+        };
+        let mut cells = vec![printable(&self.flight), estimate];
         cells.extend(self.three_d.map(|v| v.map_or_else(|| none.to_string(), |v| format!("{v:.3}"))));
         cells.push(printable(&self.depth));
         let both = self.reference.iter().chain(&self.on_board);

@@ -24,6 +24,11 @@ const SCHEME: &str = "vice.key/1";
 const ABOVE: (&str, usize) = ("trajectoryOffsets.yaml", 4);
 
 impl Key {
+    /// The key of a name that was read.
+    pub(super) fn named(name: &str) -> Self {
+        Self(name.to_string())
+    }
+
     /// The key of a request whose paths are relative to `base`.
     ///
     /// # Errors

@@ -7,8 +7,8 @@ use serde_json::Value;
 use vice_core::error::{DataError, DataResult, ErrorKind};
 
 use super::cells::{Cells, RawRow, wrong};
-use super::field::{self, Cell, DATASET, GROUP, RUN_ID};
-use super::{csv_rows, glob, toml_rows};
+use super::field::{self, Cell, DATASET, ESTIMATOR, FLIGHT, GROUP, RUN_ID};
+use super::{csv_rows, glob, parquet_rows, toml_rows};
 use crate::error::RunResult;
 use crate::request::Request;
 
@@ -30,6 +30,10 @@ pub struct Row {
     pub run_id: String,
     /// What it stands under in a table; may be empty.
     pub group: String,
+    /// The flight that it stands under in a table: its own name, unless several runs are one flight's.
+    pub flight: String,
+    /// Whose the estimates are, in their order, or one for all; empty where the streams' names say it.
+    pub estimators: Vec<String>,
     /// What is asked, with paths as the manifest has them.
     pub request: Request,
     /// The line of the manifest.
@@ -37,7 +41,7 @@ pub struct Row {
 }
 
 impl Manifest {
-    /// Reads a manifest: TOML where the name ends so, else CSV.
+    /// Reads a manifest: TOML, CSV or Parquet by the ending of its name.
     ///
     /// # Errors
     /// [`DataError`] with path and line for what cannot be read, columns that are not known, values that are none,
@@ -48,20 +52,14 @@ impl Manifest {
     }
 
     fn parse_file(path: &Path) -> DataResult<Self> {
-        let text = match std::fs::read_to_string(path) {
-            Ok(text) => text,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
-                return Err(DataError::of_kind(ErrorKind::Missing, "no such file"));
-            }
-            Err(e) => return Err(DataError::new("cannot be read as text").because(e)),
-        };
         let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
         let (defaults, raw) = match ending.as_str() {
-            "toml" => toml_rows::read(&text)?,
-            "csv" => csv_rows::read(&text)?,
+            "toml" => toml_rows::read(&text_of(path)?)?,
+            "csv" => csv_rows::read(&text_of(path)?)?,
+            "parquet" => parquet_rows::read(path)?,
             _ => {
                 return Err(DataError::of_kind(ErrorKind::Usage, "is no manifest by its name")
-                    .hint("name it .toml or .csv"));
+                    .hint("name it .toml, .csv or .parquet"));
             }
         };
         let base = path.parent().map(Path::to_path_buf).unwrap_or_default();
@@ -81,6 +79,13 @@ impl Manifest {
         }
         Ok(Self { path: path.to_path_buf(), base, rows })
     }
+}
+
+fn text_of(path: &Path) -> DataResult<String> {
+    std::fs::read_to_string(path).map_err(|e| match e.kind() {
+        std::io::ErrorKind::NotFound => DataError::of_kind(ErrorKind::Missing, "no such file"),
+        _ => DataError::new("cannot be read as text").because(e),
+    })
 }
 
 /// The runs of a row: one, or one for each path that its wildcard stands for.
@@ -104,7 +109,9 @@ fn one(cells: &Cells, dataset: &str, line: u64) -> DataResult<Row> {
     let name = Path::new(dataset).file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     let filled = |text: &str| text.replace("{dataset}", dataset).replace("{name}", &name);
     let mut fields = field::start();
-    for (place, (cell, at)) in cells.iter().filter(|(p, _)| ![RUN_ID, GROUP, DATASET].contains(&p.as_str())) {
+    for (place, (cell, at)) in
+        cells.iter().filter(|(p, _)| ![RUN_ID, GROUP, FLIGHT, ESTIMATOR, DATASET].contains(&p.as_str()))
+    {
         field::put(&mut fields, place, &cell.map(filled))
             .map_err(|e| wrong(*at, format!("{}: {e}", field::option(place))))?;
     }
@@ -112,8 +119,17 @@ fn one(cells: &Cells, dataset: &str, line: u64) -> DataResult<Row> {
     let request: Request =
         serde_json::from_value(Value::Object(fields)).map_err(|e| wrong(line, e.to_string()))?;
     request.check().map_err(|e| wrong(line, e.to_string()))?;
+    let run_id = filled(&cells.text(RUN_ID)?.unwrap_or_else(|| "{dataset}".to_string()));
+    let estimators = cells.get(ESTIMATOR).map_or_else(Vec::new, |cell| cell.map(filled).parts());
+    let estimates = request.streams.estimates.len();
+    if estimators.len() > 1 && estimators.len() != estimates {
+        let problem = format!("{} names for {estimates} estimates", estimators.len());
+        return Err(wrong(line, format!("{ESTIMATOR}: {problem}")).hint("give one for each, or one for all"));
+    }
     Ok(Row {
-        run_id: filled(&cells.text(RUN_ID)?.unwrap_or_else(|| "{dataset}".to_string())),
+        flight: filled(&cells.text(FLIGHT)?.unwrap_or_else(|| run_id.clone())),
+        run_id,
+        estimators,
         group: filled(&cells.text(GROUP)?.unwrap_or_default()),
         request,
         line,
@@ -168,7 +184,10 @@ mod tests {
         assert!(error("m.toml", "\n[[run]]\nfsp = 1\n").starts_with("m.toml:3: there is no column `fsp`"));
         assert!(error("m.toml", "[[run]\n").starts_with("m.toml:1: is no TOML"));
         assert!(error("m.toml", "[run]\n").starts_with("m.toml:1: `run` is not known"));
-        assert!(error("m.txt", "").starts_with("m.txt: is no manifest by its name (name it .toml or .csv)"));
+        assert!(
+            error("m.txt", "")
+                .starts_with("m.txt: is no manifest by its name (name it .toml, .csv or .parquet)")
+        );
         assert!(error("m.csv", "dataset\n").starts_with("m.csv: holds no run"));
     }
 }

@@ -1,21 +1,17 @@
-//! `results.csv`: one row a run, pose stream and depth source.
-
-use std::path::Path;
+//! The results of a batch: one row a run, pose stream and depth source.
 
 use serde::{Deserialize, Serialize};
-use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::result::{PixelPart, Role};
 
-use crate::error::RunResult;
-use crate::report::csv::{cell, finished};
 use crate::result::{MAX_SKIPPED_PERCENT, ResultDocument};
 
 /// Name and version of the columns.
-pub const SCHEMA: &str = "vice.results/1";
+pub const SCHEMA: &str = "vice.results/2";
 
 /// A row. No time and no place is in it, so that it is the same wherever the run was made. Names say units; what could
 /// not be had is empty.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ResultRow {
     /// [`SCHEMA`].
     pub schema: String,
@@ -23,6 +19,8 @@ pub struct ResultRow {
     pub run_id: String,
     /// Its group.
     pub group: String,
+    /// The flight that it stands under in a table; runs of one flight are repeated runs.
+    pub flight: String,
     /// The data set, as the manifest has it.
     pub dataset: String,
     /// What the result is filed under.
@@ -42,6 +40,8 @@ pub struct ResultRow {
     pub camera: String,
     /// The pose stream.
     pub stream: String,
+    /// The estimator whose estimate it is, which repeated runs share: the stream, unless the manifest says another.
+    pub estimator: String,
     /// `reference` or `estimate`.
     pub role: String,
     /// The depth source.
@@ -93,8 +93,22 @@ pub struct ResultRow {
 }
 
 impl ResultRow {
-    /// The rows of a result, which start from `common`.
-    pub(super) fn of_document(common: &Self, document: &ResultDocument) -> Vec<Self> {
+    /// The rows of a result, which start from `common`. `estimators` says whose the estimates are, in their order.
+    pub(super) fn of_document(common: &Self, document: &ResultDocument, estimators: &[String]) -> Vec<Self> {
+        let mut estimates: Vec<&str> = Vec::new();
+        for part in document.pixel.iter().filter(|p| p.role == Role::Estimate) {
+            if !estimates.contains(&part.stream.as_str()) {
+                estimates.push(&part.stream);
+            }
+        }
+        let estimator = |part: &PixelPart| {
+            let place = estimates.iter().position(|e| *e == part.stream).unwrap_or(0);
+            match (part.role, estimators) {
+                (Role::Estimate, [one]) => one.clone(),
+                (Role::Estimate, several) => several.get(place).unwrap_or(&part.stream).clone(),
+                (Role::Reference, _) => part.stream.clone(),
+            }
+        };
         let exit_code = if document.worst_skipped_percent() > MAX_SKIPPED_PERCENT { 3 } else { 0 };
         document
             .pixel
@@ -110,10 +124,11 @@ impl ResultRow {
                     exit_code: Some(exit_code),
                     vice_version: document.vice_version.clone(),
                     format: document.dataset.format.clone(),
-                    camera: cell(&document.dataset.camera),
-                    stream: cell(&part.stream),
-                    role: role(part).to_string(),
-                    depth: cell(&part.depth),
+                    camera: document.dataset.camera.clone(),
+                    stream: part.stream.clone(),
+                    estimator: estimator(part),
+                    role: role_name(part.role).to_string(),
+                    depth: part.depth.clone(),
                     rmse_3d_m: trajectory.and_then(|t| t.rmse_3d_m),
                     aoe_rad: trajectory.and_then(|t| t.aoe_rad),
                     roe_rad: trajectory.and_then(|t| t.roe_rad),
@@ -153,60 +168,10 @@ impl ResultRow {
     }
 }
 
-fn role(part: &PixelPart) -> &'static str {
-    match part.role {
+/// The role as a word.
+pub(super) const fn role_name(role: Role) -> &'static str {
+    match role {
         Role::Reference => "reference",
         Role::Estimate => "estimate",
     }
-}
-
-/// Rows as CSV with a heading.
-///
-/// # Errors
-/// [`RunError`](crate::error::RunError) if a text is none.
-pub fn to_csv(rows: &[impl Serialize]) -> RunResult<String> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        writer.serialize(row)?;
-    }
-    finished(writer)
-}
-
-/// Reads a `results.csv`.
-///
-/// # Errors
-/// [`DataError`] with path and line for what is none, or of another version.
-pub fn read(path: &Path) -> DataResult<Vec<ResultRow>> {
-    let wrong = |e: csv::Error| {
-        let error = DataError::new("is no results.csv").at(path);
-        let line = e.position().map(csv::Position::line);
-        line.map_or(error.hint("`vice batch collect` writes one"), |line| {
-            DataError::new("is no row of a results.csv").at(path).line(line)
-        })
-        .because(e)
-    };
-    let text = crate::result::read_bytes(path)?;
-    let mut reader = csv::Reader::from_reader(text.as_slice());
-    let first = reader.headers().map_err(wrong)?.get(0).map(str::to_string);
-    if first.as_deref() != Some("schema") {
-        return Err(DataError::of_kind(
-            ErrorKind::Usage,
-            "is no results.csv: its first column is not `schema`",
-        )
-        .at(path)
-        .hint("`vice batch collect` writes one"));
-    }
-    let mut rows = Vec::new();
-    for row in reader.deserialize::<ResultRow>() {
-        let row = row.map_err(wrong)?;
-        if row.schema != SCHEMA {
-            return Err(DataError::of_kind(
-                ErrorKind::Unsupported,
-                format!("is {}, this VICE reads {SCHEMA}", row.schema),
-            )
-            .at(path));
-        }
-        rows.push(row);
-    }
-    Ok(rows)
 }

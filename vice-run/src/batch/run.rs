@@ -5,17 +5,21 @@ use std::path::Path;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use vice_core::error::{ErrorKind, one_line};
+use vice_core::evaluate::SampleSink;
 
 use super::content::Hashes;
 use super::key::Key;
 use super::manifest::{Manifest, Row};
 use super::paths;
-use super::store::{RowRecord, Store};
+use super::samples;
+use super::store::{Keep, RowRecord, Store};
 use crate::error::{RunError, RunResult};
 use crate::evaluation::{Samples, silent};
+use crate::report::frames::Shots;
+use crate::report::html;
 use crate::request::Request;
 use crate::result::ResultDocument;
 use crate::scans::Scans;
@@ -23,6 +27,9 @@ use crate::text::with_options;
 
 /// Most memory that scans take which are kept for the next run, bytes.
 const SCAN_BYTES: usize = 128 << 20;
+
+/// How long hashes are held before they are kept.
+const BETWEEN_SAVES: Duration = Duration::from_secs(20);
 
 /// How a batch is run.
 #[derive(Clone, Copy, Debug)]
@@ -33,6 +40,8 @@ pub struct Options {
     pub shard: Shard,
     /// How often a run that failed is tried again, where what is asked makes sense.
     pub retry: usize,
+    /// What is kept beside the results.
+    pub keep: Keep,
 }
 
 /// Part `index` of `count`, from 1: of the rows in turn, so that each part has some of each group.
@@ -130,12 +139,12 @@ pub struct Planned<'a> {
 }
 
 /// Looks at what a batch would do; nothing is written.
-pub fn plan<'a>(manifest: &'a Manifest, store: &Store, shard: Shard) -> Vec<Planned<'a>> {
+pub fn plan<'a>(manifest: &'a Manifest, store: &Store, shard: Shard, keep: Keep) -> Vec<Planned<'a>> {
     let hashes = Hashes::read(&store.hashes());
     let rows = manifest.rows.iter().enumerate().filter(|(place, _)| shard.has(*place));
     let planned = rows.map(|(_, row)| {
         let key = Key::of(&row.request, &manifest.base, &hashes).map_err(|e| told(&e, &manifest.base));
-        let is_there = key.as_ref().is_ok_and(|key| store.result_path(key).exists());
+        let is_there = key.as_ref().is_ok_and(|key| store.has(key, keep));
         Planned { row, key, is_there }
     });
     planned.collect()
@@ -156,7 +165,15 @@ pub fn run(
     store.prepare(manifest)?;
     let hashes = Arc::new(Hashes::read(&store.hashes()));
     let of_scans = Arc::clone(&hashes);
-    let scans = Arc::new(Scans::new(SCAN_BYTES, move |path| of_scans.identity(path)));
+    let shared = Shared {
+        base: &manifest.base,
+        store,
+        scans: Arc::new(Scans::new(SCAN_BYTES, move |path| of_scans.identity(path))),
+        hashes,
+        retry: options.retry,
+        keep: options.keep,
+    };
+    let saved = Mutex::new(Instant::now());
     let rows: Vec<&Row> =
         manifest.rows.iter().enumerate().filter(|(p, _)| options.shard.has(*p)).map(|(_, r)| r).collect();
     let summary = Mutex::new(Summary { total: rows.len(), ..Summary::default() });
@@ -164,7 +181,7 @@ pub fn run(
     let work = || {
         while !stop.load(Ordering::SeqCst) {
             let Some(row) = rows.get(next.fetch_add(1, Ordering::SeqCst)) else { break };
-            match one(row, &manifest.base, store, &hashes, &scans, options.retry) {
+            match one(row, &shared) {
                 Ok((record, state)) => {
                     let mut summary = summary.lock().unwrap_or_else(PoisonError::into_inner);
                     match state {
@@ -173,6 +190,13 @@ pub fn run(
                         State::Failed => summary.failed += 1,
                     }
                     tell(&Event { record: &record, state, summary: *summary });
+                    drop(summary);
+                    // So that who is killed need not read everything again.
+                    let mut saved = saved.lock().unwrap_or_else(PoisonError::into_inner);
+                    if saved.elapsed() > BETWEEN_SAVES {
+                        *saved = Instant::now();
+                        let _ = shared.hashes.write(&store.hashes());
+                    }
                 }
                 Err(error) => {
                     failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
@@ -190,7 +214,7 @@ pub fn run(
         }
         work();
     });
-    hashes.write(&store.hashes())?;
+    shared.hashes.write(&store.hashes())?;
     match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
         Some(error) => Err(error),
         None => Ok(summary.into_inner().unwrap_or_else(PoisonError::into_inner)),
@@ -215,14 +239,18 @@ fn refuse_in_data(manifest: &Manifest, folder: &Path) -> RunResult<()> {
     Ok(())
 }
 
-fn one(
-    row: &Row,
-    base: &Path,
-    store: &Store,
-    hashes: &Hashes,
-    scans: &Arc<Scans>,
+/// What all runs of a batch share.
+struct Shared<'a> {
+    base: &'a Path,
+    store: &'a Store,
+    hashes: Arc<Hashes>,
+    scans: Arc<Scans>,
     retry: usize,
-) -> RunResult<(RowRecord, State)> {
+    keep: Keep,
+}
+
+fn one(row: &Row, shared: &Shared<'_>) -> RunResult<(RowRecord, State)> {
+    let Shared { base, store, hashes, retry, keep, .. } = shared;
     let begun = Instant::now();
     let record = |key, error| RowRecord::new(row, key, error, begun.elapsed().as_secs_f64());
     let failed = |key: Option<Key>, error: &RunError| {
@@ -233,7 +261,7 @@ fn one(
         Ok(key) => key,
         Err(error) => return written(store, failed(None, &error), State::Failed),
     };
-    if store.result_path(&key).exists() {
+    if store.has(&key, *keep) {
         return match store.row(&row.run_id) {
             Ok(Some(there)) if there.answers(row, &key) => Ok((there, State::Skipped)),
             _ => written(store, record(Some(key), None), State::Skipped),
@@ -241,13 +269,14 @@ fn one(
     }
     let mut tries = 0;
     loop {
-        let found = catch_unwind(AssertUnwindSafe(|| evaluated(&row.request, base, scans)));
+        let found = catch_unwind(AssertUnwindSafe(|| evaluated(&row.request, &key, shared)));
         match found {
             Ok(Ok(document)) => {
+                // The last of its files: where it is, the others are.
                 store.write_result(&key, &document)?;
                 return written(store, record(Some(key), None), State::Done);
             }
-            Ok(Err(error)) if error.kind() == ErrorKind::Usage || tries >= retry => {
+            Ok(Err(error)) if error.kind() == ErrorKind::Usage || tries >= *retry => {
                 return written(store, failed(Some(key), &error), State::Failed);
             }
             Ok(Err(_)) => tries += 1,
@@ -265,13 +294,27 @@ fn written(store: &Store, record: RowRecord, state: State) -> RunResult<(RowReco
 }
 
 /// The document of a request, which says the paths as the manifest does: its bytes do not tell where it was made.
-fn evaluated(request: &Request, base: &Path, scans: &Arc<Scans>) -> RunResult<ResultDocument> {
-    let resolved = paths::resolved(request, base);
+fn evaluated(request: &Request, key: &Key, shared: &Shared<'_>) -> RunResult<ResultDocument> {
+    let resolved = paths::resolved(request, shared.base);
     let mut opened = resolved.open()?;
-    opened.scans = Some(Arc::clone(scans));
-    let mut document = resolved.evaluate(&opened, Samples::Drop, &silent)?;
-    document.drop_samples();
+    opened.scans = Some(Arc::clone(&shared.scans));
+    let samples_path = shared.store.samples_path(key);
+    let mut document = match shared.keep {
+        Keep { reports: true, .. } => resolved.evaluate(&opened, Samples::Keep, &silent)?,
+        Keep { samples: true, .. } => samples::write(&samples_path, |sink| {
+            resolved.evaluate(&opened, Samples::Stream(sink as &mut SampleSink<'_>), &silent)
+        })?,
+        _ => resolved.evaluate(&opened, Samples::Drop, &silent)?,
+    };
     document.request = request.clone();
+    if shared.keep.reports {
+        if shared.keep.samples {
+            samples::write_kept(&samples_path, &document)?;
+        }
+        let page = html::render(&[html::Run::new(document.clone(), Shots::default())])?;
+        shared.store.write_report(key, &page)?;
+    }
+    document.drop_samples();
     Ok(document)
 }
 

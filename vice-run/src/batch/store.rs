@@ -15,11 +15,20 @@ use super::manifest::{Manifest, Row};
 use crate::request::Request;
 use crate::result::{ResultDocument, read_bytes};
 
-const BATCH_SCHEMA: &str = "vice.batch/1";
+const BATCH_SCHEMA: &str = "vice.batch/2";
 const ROW_SCHEMA: &str = "vice.row/1";
 
 /// A file that was begun so long ago was never ended: whoever wrote it was killed.
 const ABANDONED: Duration = Duration::from_secs(3600);
+
+/// What a run keeps beside its result.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Keep {
+    /// The scored samples, as Parquet.
+    pub samples: bool,
+    /// A report, without pictures of the recording.
+    pub reports: bool,
+}
 
 /// A batch's folder.
 #[derive(Clone, Debug)]
@@ -38,6 +47,10 @@ pub(super) struct Listed {
 pub(super) struct ListedRow {
     pub(super) run_id: String,
     pub(super) group: String,
+    /// The flight that it stands under in a table.
+    pub(super) flight: String,
+    /// Whose the estimates are, in their order; empty where the streams' names say it.
+    pub(super) estimators: Vec<String>,
     pub(super) dataset: String,
     /// Hash of what is asked, so that the answer to an older manifest is not taken for one to this.
     pub(super) asked: String,
@@ -88,7 +101,7 @@ impl Store {
 
     /// Makes it ready for the runs of a manifest.
     pub(super) fn prepare(&self, manifest: &Manifest) -> DataResult<()> {
-        for name in ["runs", "rows"] {
+        for name in ["runs", "rows", "reports"] {
             let folder = self.folder.join(name);
             fs::create_dir_all(&folder)
                 .map_err(|e| DataError::new("the folder cannot be made").at(&folder).because(e))?;
@@ -97,6 +110,8 @@ impl Store {
         let rows = manifest.rows.iter().map(|row| ListedRow {
             run_id: row.run_id.clone(),
             group: row.group.clone(),
+            flight: row.flight.clone(),
+            estimators: row.estimators.clone(),
             dataset: row.request.dataset.path.display().to_string(),
             asked: asked(&row.request),
         });
@@ -129,6 +144,33 @@ impl Store {
         self.folder.join("runs").join(format!("{key}.json"))
     }
 
+    /// Where the scored samples of a key are, if they were kept.
+    pub fn samples_path(&self, key: &Key) -> PathBuf {
+        self.folder.join("runs").join(format!("{key}.parquet"))
+    }
+
+    /// Where the report of a key is, if one was made; from the folder.
+    pub(super) fn report_name(key: &str) -> String {
+        format!("reports/{key}.html")
+    }
+
+    /// Whether it is the folder of a batch.
+    pub fn is_there(&self) -> bool {
+        self.folder.join("batch.json").is_file()
+    }
+
+    /// Whether reports were made.
+    pub fn has_reports(&self) -> bool {
+        fs::read_dir(self.folder.join("reports")).is_ok_and(|mut entries| entries.next().is_some())
+    }
+
+    /// Whether all that is asked for is there.
+    pub(super) fn has(&self, key: &Key, keep: Keep) -> bool {
+        self.result_path(key).exists()
+            && (!keep.samples || self.samples_path(key).exists())
+            && (!keep.reports || self.folder.join(Self::report_name(&key.to_string())).exists())
+    }
+
     fn row_path(&self, run_id: &str) -> PathBuf {
         let hash = hex(&Sha256::digest(run_id.as_bytes())[..16]);
         self.folder.join("rows").join(format!("{hash}.json"))
@@ -147,6 +189,11 @@ impl Store {
 
     pub(super) fn write_row(&self, row: &RowRecord) -> DataResult<()> {
         write_json(&self.row_path(&row.run_id), row)
+    }
+
+    pub(super) fn write_report(&self, key: &Key, page: &str) -> DataResult<()> {
+        let path = self.folder.join(Self::report_name(&key.to_string()));
+        atomic::write(path, Overwrite::Replace, |out| out.write_all(page.as_bytes()))
     }
 
     pub(super) fn write_result(&self, key: &Key, document: &ResultDocument) -> DataResult<()> {

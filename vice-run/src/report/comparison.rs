@@ -5,11 +5,12 @@ use std::fmt::Write;
 use crate::error::RunResult;
 use crate::result::ResultDocument;
 use serde::Serialize;
+use vice_core::fleet::{FleetDifference, FlightErrors, difference};
 use vice_core::paired::{Paired, paired};
 use vice_core::result::{PixelPart, Role};
-use vice_core::statistics::WithInterval;
 
 use super::csv::{cell, finished};
+use super::difference::{interval, verdict};
 use super::latex::escape;
 use super::table::align;
 use crate::text::printable;
@@ -73,6 +74,9 @@ pub struct Document {
     seed: u64,
     /// The comparisons.
     pub comparisons: Vec<Comparison>,
+    /// The same pair over several recordings, where there are several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub over_flights: Vec<OverFlights>,
 }
 
 /// A run with its name.
@@ -82,7 +86,9 @@ impl Document {
     /// Compares all pairs of a kind; pairs without a label in common are told to `warn`.
     pub fn of(runs: &[NamedRun], by: By, seed: u64, warn: &dyn Fn(String)) -> Self {
         let mut comparisons = Vec::new();
-        for (a, b) in pairs(runs, by) {
+        let pairs = pairs(runs, by);
+        let over_flights = if flight_count(runs) > 1 { over_flights(&pairs, by, seed) } else { vec![] };
+        for (a, b) in pairs {
             let sides = (a.side(), b.side());
             match paired(a.part, b.part, seed) {
                 Some(paired) => {
@@ -101,7 +107,8 @@ impl Document {
                 }
             }
         }
-        Self { schema: "vice.comparison/1", vice_version: env!("CARGO_PKG_VERSION"), by, seed, comparisons }
+        let (schema, vice_version) = ("vice.comparison/1", env!("CARGO_PKG_VERSION"));
+        Self { schema, vice_version, by, seed, comparisons, over_flights }
     }
 }
 
@@ -148,38 +155,84 @@ fn within(runs: &[NamedRun], alike: impl Fn(&PixelPart, &PixelPart) -> bool) -> 
     pairs
 }
 
+/// The results by what they are of, each with those that are held against its first.
+fn by_flight(runs: &[NamedRun]) -> Vec<Vec<&NamedRun>> {
+    let flight = |run: &NamedRun| {
+        let dataset = &run.1.dataset;
+        (dataset.name.clone(), dataset.camera.clone(), dataset.first_frame_ns)
+    };
+    let mut flights: Vec<Vec<&NamedRun>> = Vec::new();
+    for run in runs {
+        match flights.iter_mut().find(|f| flight(f[0]) == flight(run)) {
+            Some(of_flight) => of_flight.push(run),
+            None => flights.push(vec![run]),
+        }
+    }
+    flights
+}
+
+/// How many different recordings the results are of.
+pub fn flight_count(runs: &[NamedRun]) -> usize {
+    by_flight(runs).len()
+}
+
 fn between_runs(runs: &[NamedRun]) -> Vec<(Entry<'_>, Entry<'_>)> {
-    let Some(((first_name, first), others)) = runs.split_first() else { return vec![] };
     let mut pairs = Vec::new();
-    for (name, document) in others {
-        for a in &first.pixel {
-            let candidates = || document.pixel.iter().filter(|p| p.role == a.role && p.depth == a.depth);
-            // A file that was given another name is the same estimate where there is only one in each.
-            let alone = first.pixel.iter().filter(|p| p.role == a.role && p.depth == a.depth).count() == 1
-                && candidates().count() == 1;
-            if let Some(b) = candidates().find(|p| alone || p.stream == a.stream) {
-                pairs.push((Entry { run: first_name, part: a }, Entry { run: name, part: b }));
+    for flight in by_flight(runs) {
+        let Some(((first_name, first), others)) = flight.split_first().map(|(f, o)| ((&f.0, &f.1), o)) else {
+            continue;
+        };
+        for (name, document) in others {
+            for a in &first.pixel {
+                let candidates = || document.pixel.iter().filter(|p| p.role == a.role && p.depth == a.depth);
+                // A file that was given another name is the same estimate where there is only one in each.
+                let alone = first.pixel.iter().filter(|p| p.role == a.role && p.depth == a.depth).count()
+                    == 1
+                    && candidates().count() == 1;
+                if let Some(b) = candidates().find(|p| alone || p.stream == a.stream) {
+                    pairs.push((Entry { run: first_name, part: a }, Entry { run: name, part: b }));
+                }
             }
         }
     }
     pairs
 }
 
-fn interval(number: &WithInterval, decimals: usize) -> String {
-    match number.interval_95 {
-        Some([low, high]) => format!("{:+.decimals$} [{low:+.decimals$}, {high:+.decimals$}]", number.value),
-        None => format!("{:+.decimals$} [-]", number.value),
-    }
+/// A pair of sides over the flights that have it.
+#[derive(Debug, Serialize)]
+pub struct OverFlights {
+    /// What is held against ...
+    pub a: String,
+    /// ... this.
+    pub b: String,
+    /// The differences.
+    #[serde(flatten)]
+    pub difference: FleetDifference,
 }
 
-/// What the interval allows to say.
-fn verdict(p: &Paired) -> &'static str {
-    match p.rmse_difference_px.interval_95 {
-        Some([low, _]) if low > 0.0 => "B is worse",
-        Some([_, high]) if high < 0.0 => "B is better",
-        Some(_) => "not told apart",
-        None => "too little to tell",
+/// What pairs are the same pair on another flight, and its errors there.
+fn over_flights(pairs: &[(Entry<'_>, Entry<'_>)], by: By, seed: u64) -> Vec<OverFlights> {
+    let name = |entry: &Entry<'_>, side: &str| {
+        let PixelPart { stream, depth, .. } = entry.part;
+        match by {
+            By::Runs => format!("{side} result: {stream} with {depth}"),
+            By::Streams | By::Depths => format!("{stream} with {depth}"),
+        }
+    };
+    let mut same: Vec<((String, String), Vec<FlightErrors>)> = Vec::new();
+    for (a, b) in pairs {
+        let errors = FlightErrors::of_samples(&[vec![&a.part.samples], vec![&b.part.samples]]);
+        let Some(errors) = errors else { continue };
+        let names = (name(a, "first"), name(b, "later"));
+        match same.iter_mut().find(|(n, _)| *n == names) {
+            Some((_, flights)) => flights.push(errors),
+            None => same.push((names, vec![errors])),
+        }
     }
+    let several = same.into_iter().filter(|(_, flights)| flights.len() > 1);
+    let found = several
+        .filter_map(|((a, b), flights)| Some(OverFlights { a, b, difference: difference(&flights, seed)? }));
+    found.collect()
 }
 
 /// The table on the terminal.
@@ -198,12 +251,30 @@ pub fn text(document: &Document) -> String {
             interval(&p.rmse_difference_px, 3),
             interval(&p.mean_difference_px, 3),
             format!("{:.0} %", 100.0 * p.b_nearer_share),
-            verdict(p).to_string(),
+            verdict(&p.rmse_difference_px).to_string(),
         ]);
     }
     let mut text =
         "RMSE_2D at the labels that both scored; intervals by resampling points and segments\n\n".to_string();
     text.push_str(&align(&grid));
+    if !document.over_flights.is_empty() {
+        let head = ["A", "B", "flights", "A px", "B px", "B - A px [95 %]", "B nearer on", ""];
+        let mut grid = vec![head.map(String::from).to_vec()];
+        for OverFlights { a, b, difference: d } in &document.over_flights {
+            grid.push(vec![
+                printable(a),
+                printable(b),
+                d.flights.to_string(),
+                format!("{:.3}", d.a_px),
+                format!("{:.3}", d.b_px),
+                interval(&d.difference_px, 3),
+                format!("{} of {}", d.b_nearer, d.flights),
+                verdict(&d.difference_px).to_string(),
+            ]);
+        }
+        text.push_str("\nover the flights: mean of their RMSE_2D at the labels that both scored\n\n");
+        text.push_str(&align(&grid));
+    }
     for c in document.comparisons.iter().filter(|c| c.paired.only_a + c.paired.only_b > 0) {
         text.push_str(&format!(
             "{} labels only in A ({}), {} only in B ({})\n",
@@ -309,6 +380,29 @@ mod tests {
         assert!(names(&runs, By::Depths).is_empty());
         let renamed = [run("x", &[("old", 1.0)]), run("y", &[("new", 3.0)])];
         assert_eq!(names(&renamed, By::Runs), ["x: old with floor < y: new with floor"]);
+    }
+
+    #[test]
+    fn results_of_several_recordings_are_compared_recording_by_recording() {
+        let of = |name: &str, flight: &str, error: f64| {
+            let mut run = run(name, &[("e", error), ("f", 2.0 * error)]);
+            run.1.dataset.name = flight.to_string();
+            run
+        };
+        let runs = [of("a1", "one", 1.0), of("a2", "two", 1.2), of("b1", "one", 3.0), of("b2", "two", 3.4)];
+        assert_eq!(flight_count(&runs), 2);
+        let made = Document::of(&runs, By::Runs, 1, &|_| {});
+        let names: Vec<_> = made.comparisons.iter().map(|c| (c.a.run.as_str(), c.b.run.as_str())).collect();
+        assert_eq!(names, [("a1", "b1"), ("a1", "b1"), ("a2", "b2"), ("a2", "b2")]);
+        let [e, f] = &made.over_flights[..] else { panic!("{:?}", made.over_flights) };
+        assert_eq!((e.a.as_str(), e.difference.flights), ("first result: e with floor", 2));
+        assert!((e.difference.difference_px.value - 2.1).abs() < 1e-12);
+        assert!((f.difference.difference_px.value - 4.2).abs() < 1e-12);
+        assert!(text(&made).contains("over the flights"));
+        // The streams of each recording, and over both.
+        let made = Document::of(&runs[..2], By::Streams, 1, &|_| {});
+        assert_eq!((made.comparisons.len(), made.over_flights.len()), (2, 1));
+        assert_eq!(made.over_flights[0].b, "f with floor");
     }
 
     #[test]

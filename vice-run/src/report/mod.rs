@@ -4,6 +4,7 @@ pub mod comparison;
 pub mod csv;
 pub(crate) mod depth_picture;
 pub mod diagnosis_text;
+pub(crate) mod difference;
 pub(crate) mod evo_zip;
 pub(crate) mod film_frame;
 pub(crate) mod flaw_units;

@@ -11,7 +11,7 @@ use vice_core::result::{PointName, Sample};
 use vice_core::time::Stamp;
 use vice_files::atomic::{self, Overwrite};
 
-use crate::error::{RunError, RunResult};
+use crate::error::RunResult;
 
 /// A line.
 #[derive(Serialize)]
@@ -26,22 +26,15 @@ struct Line<'a> {
 }
 
 /// Makes the file of what `evaluate` hands to its sink. If that fails there is no file.
+///
+/// # Errors
+/// That of `evaluate`, or [`RunError`](crate::error::RunError) if the file cannot be written.
 pub fn write<T>(path: &Path, evaluate: impl FnOnce(&mut SampleSink<'_>) -> RunResult<T>) -> RunResult<T> {
-    let mut result = None;
-    let written = atomic::write(path, Overwrite::Replace, |out| {
-        let outcome = evaluate(&mut |stream, depth, samples| {
+    atomic::write_and_return(path, Overwrite::Replace, |out| {
+        evaluate(&mut |stream, depth, samples| {
             samples.iter().try_for_each(|sample| write_line(out, stream, depth, sample))
-        });
-        let done = outcome.is_ok();
-        result = Some(outcome);
-        if done { Ok(()) } else { Err(io::Error::other("evaluating failed")) }
-    });
-    match (result, written) {
-        (Some(Err(error)), _) => Err(error),
-        (Some(Ok(value)), Ok(())) => Ok(value),
-        (_, Err(error)) => Err(error.into()),
-        (None, Ok(())) => Err(RunError::missing(format!("{} was not filled", path.display()))),
-    }
+        })
+    })
 }
 
 fn write_line(out: &mut dyn Write, stream: &str, depth: &str, sample: &Sample) -> io::Result<()> {

@@ -187,7 +187,7 @@ pub fn write_with_frames(
     if format == LabelFormat::Cvat && frame_stamps.is_none() {
         return Err(counts_frames("CVAT").at(path));
     }
-    atomic::write(path, overwrite, |w: &mut dyn Write| -> io::Result<()> {
+    atomic::write(path, overwrite, |w: &mut (dyn Write + Send)| -> io::Result<()> {
         match format {
             LabelFormat::Json => write_json(w, labels),
             LabelFormat::Cvat => write_cvat(w, labels, frame_stamps.unwrap_or_default()),

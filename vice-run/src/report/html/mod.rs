@@ -69,9 +69,9 @@ pub fn render(runs: &[Run]) -> RunResult<String> {
     Ok(page::page(&title, &content, &data))
 }
 
-/// A page around content that is no run's.
-pub(crate) fn bare_page(title: &str, content: &Markup) -> String {
-    page::page(title, content, &[])
+/// A page around content that is no run's, with a script of its own.
+pub(crate) fn page_with(title: &str, content: &Markup, script: &str) -> String {
+    page::page_with(title, content, &[], script)
 }
 
 fn section(run: &Run, place: usize, alone: bool) -> Markup {

@@ -12,12 +12,17 @@ const SLIDER: &str = include_str!("slider.js");
 
 /// A whole page. `data` is JSON for machines, already made safe for a script element.
 pub(crate) fn page(title: &str, content: &Markup, data: &[String]) -> String {
+    page_with(title, content, data, SLIDER)
+}
+
+/// A whole page with the one script that may run in it.
+pub(crate) fn page_with(title: &str, content: &Markup, data: &[String], script: &str) -> String {
     let style = format!("{STYLE}{}", picture::CSS);
-    // Nothing is fetched, and no script runs but the one slider, even if some text from data slipped through.
+    // Nothing is fetched, and no script runs but this one, even if some text from data slipped through.
     let policy = format!(
         "default-src 'none'; img-src data:; style-src '{}'; script-src '{}'; base-uri 'none'; form-action 'none'",
         hash(&style),
-        hash(SLIDER)
+        hash(script)
     );
     let page = html! {
         (DOCTYPE)
@@ -37,7 +42,7 @@ pub(crate) fn page(title: &str, content: &Markup, data: &[String]) -> String {
                 @for json in data {
                     script type="application/json" class="result" { (PreEscaped(json)) }
                 }
-                script { (PreEscaped(SLIDER)) }
+                script { (PreEscaped(script)) }
             }
         }
     };
