@@ -14,6 +14,7 @@ use vice_files::calibration::CalibrationFile;
 
 use crate::error::{RunError, RunResult};
 use crate::formats;
+use crate::in_memory::InMemory;
 use crate::request::{DatasetSpec, Protocol};
 
 /// A recording as it is used.
@@ -29,6 +30,8 @@ pub struct Opened {
     pub frames: Arc<[Stamp]>,
     /// The calibration file, where one was given.
     pub calibration: Option<CalibrationFile>,
+    /// Poses and labels that a request may name though no file holds them.
+    pub in_memory: InMemory,
 }
 
 impl DatasetSpec {
@@ -93,7 +96,15 @@ impl DatasetSpec {
             dataset.format(),
             frames.len()
         );
-        Ok(Opened { dataset: Arc::new(calibrated), camera_name: name, camera, frames, calibration })
+        let in_memory = InMemory::default();
+        Ok(Opened {
+            dataset: Arc::new(calibrated),
+            camera_name: name,
+            camera,
+            frames,
+            calibration,
+            in_memory,
+        })
     }
 
     /// The name of the camera that was asked for, or the first.
