@@ -19,6 +19,11 @@ use arguments::{Cli, Command};
 pub use itself::Itself;
 use terminal::Outcome;
 
+/// Names of the program's commands, in the order of its help.
+pub fn commands() -> Vec<String> {
+    Cli::command().get_subcommands().map(|c| c.get_name().to_string()).collect()
+}
+
 /// Runs the program with the arguments of a command line, the first of which is its own name. Returns the exit code.
 ///
 /// `itself` says how the program is started once more, for the commands that need a process of their own. What a command

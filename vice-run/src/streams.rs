@@ -346,19 +346,24 @@ impl Loader<'_> {
     }
 }
 
-/// A file's stem, or the stream's own name; told apart by a number where two are alike.
-fn stream_name(spec: &EstimateSpec, taken: &[Stream]) -> String {
+/// What a stream is called where nothing else is said: a file's stem, or the stream's own name.
+pub fn plain_name(spec: &EstimateSpec) -> String {
     let word = own_name(&spec.word()).to_string();
     let path = Path::new(&word);
-    let stem = match path.extension() {
-        Some(_) if path.exists() => path.file_stem().and_then(|s| s.to_str()).unwrap_or(&word),
-        _ => &word,
-    };
+    match path.extension() {
+        Some(_) if path.exists() => path.file_stem().and_then(|s| s.to_str()).unwrap_or(&word).to_string(),
+        _ => word,
+    }
+}
+
+/// The same, told apart by a number where two are alike.
+fn stream_name(spec: &EstimateSpec, taken: &[Stream]) -> String {
+    let stem = plain_name(spec);
     let is_taken = |name: &str| taken.iter().any(|s| s.role == Role::Estimate && s.name == name);
     (1_usize..)
-        .map(|n| if n == 1 { stem.to_string() } else { format!("{stem}-{n}") })
+        .map(|n| if n == 1 { stem.clone() } else { format!("{stem}-{n}") })
         .find(|name| !is_taken(name))
-        .unwrap_or_else(|| stem.to_string())
+        .unwrap_or_else(|| stem.clone())
 }
 
 /// A constant rotation between the bodies is never corrected, but said.

@@ -1,0 +1,75 @@
+//! The program, and what it does without a recording.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use pyo3::prelude::*;
+use vice_cli::{Itself, commands, main_from};
+use vice_run::synthetic::{Synthetic, SyntheticOptions, write_euroc};
+
+use crate::errors::Answer;
+use crate::work::long;
+
+/// Runs the program `vice` with the arguments of a command line, its own name first. Gives the exit code.
+#[pyfunction]
+pub(crate) fn main(py: Python<'_>, args: Vec<OsString>, executable: OsString) -> u8 {
+    // As a program it says of a defect what every program does.
+    drop(std::panic::take_hook());
+    let itself = Itself::through(executable, ["-m".into(), "vicepose".into()]);
+    py.detach(|| main_from(args, itself))
+}
+
+/// Names of the program's commands.
+#[pyfunction]
+pub(crate) fn command_names() -> Vec<String> {
+    commands()
+}
+
+/// What `vice demo` prints.
+#[pyfunction]
+#[pyo3(signature = (out = None, force = false, progress = None))]
+pub(crate) fn demo(py: Python<'_>, out: Option<PathBuf>, force: bool, progress: Option<Py<PyAny>>) -> Answer<String> {
+    long(py, progress.as_ref(), move |progress| vice_run::demo::run(out.as_deref(), force, progress))
+}
+
+/// Writes a rendered flight.
+#[pyfunction]
+#[pyo3(signature = (out, seed = 1, duration = 10.0, rate = 20.0, force = false, progress = None))]
+pub(crate) fn synth(
+    py: Python<'_>,
+    out: PathBuf,
+    seed: u64,
+    duration: f64,
+    rate: f64,
+    force: bool,
+    progress: Option<Py<PyAny>>,
+) -> Answer<()> {
+    let options = SyntheticOptions { seed, duration_s: duration, rate_hz: rate, ..SyntheticOptions::default() };
+    long(py, progress.as_ref(), move |progress| {
+        let flight = Synthetic::new(options)?;
+        Ok(write_euroc(&flight, &out, force, &|done, total| progress("rendering", done, total))?)
+    })
+}
+
+/// Panics, so that tests see what becomes of it.
+#[pyfunction]
+pub(crate) fn panic_for_tests(py: Python<'_>) -> Answer<()> {
+    #[allow(clippy::panic, reason = "that is what it is for")]
+    long(py, None, |_| panic!("on purpose"))
+}
+
+/// Works on for so many seconds, reporting progress or not, so that tests can stop it.
+#[pyfunction]
+#[pyo3(signature = (seconds, reports = true, progress = None))]
+pub(crate) fn work_for_tests(py: Python<'_>, seconds: f64, reports: bool, progress: Option<Py<PyAny>>) -> Answer<()> {
+    long(py, progress.as_ref(), move |progress| {
+        let steps = (seconds * 100.0) as usize;
+        for step in 0..steps {
+            std::thread::sleep(std::time::Duration::from_millis(10));
+            if reports {
+                progress("waiting", step + 1, steps);
+            }
+        }
+        Ok(())
+    })
+}
