@@ -4,6 +4,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use vice_run::core::error::{DataError, ErrorKind, Place, one_line};
 use vice_run::error::RunError;
+use vice_run::text::is_field;
 
 /// The module of the exceptions.
 const MODULE: &str = "vicepose._errors";
@@ -106,7 +107,11 @@ fn exception(py: Python<'_>, error: &RunError) -> PyErr {
     // Keys are ours and values plain, so that setting them cannot fail for a reason a user could act on.
     let _ = values.set_item("hint", hint.map(as_arguments));
     let _ = values.set_item("argument", field.map(|f| f.replace('-', "_")));
-    let raised = raised(py, class(error.kind()), &as_arguments(&one_line(error)), &values);
+    let mut text = as_arguments(&one_line(error));
+    if let Some(own) = error.field() {
+        text = text.replacen(&format!("{own}: "), &format!("{}: ", own.replace('-', "_")), 1);
+    }
+    let raised = raised(py, class(error.kind()), &text, &values);
     if let Some(cause) = of_python {
         raised.set_cause(py, Some(cause.clone_ref(py)));
     }
@@ -127,7 +132,6 @@ fn set_place(values: &Bound<'_, PyDict>, data: &DataError) {
 
 /// Names of fields in back quotes as arguments: `max-gap` as `max_gap`.
 fn as_arguments(text: &str) -> String {
-    let is_field = |part: &str| part.chars().all(|c| c.is_ascii_lowercase() || c == '-');
     let parts = text.split('`').enumerate();
     let parts = parts.map(|(place, part)| match place % 2 == 1 && is_field(part) {
         true => part.replace('-', "_"),

@@ -169,7 +169,12 @@ impl Labels {
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| other.get().core == self.core)
+        // Not whether they stood in the same lines of a file.
+        let rows = |labels: &LabelSet| -> Vec<(String, Observation)> {
+            let all = labels.points().iter();
+            all.flat_map(|p| p.observations.iter().map(|o| (p.name.clone(), Observation { line: 0, ..*o }))).collect()
+        };
+        other.cast::<Self>().is_ok_and(|other| rows(&other.get().core) == rows(&self.core))
     }
 
     fn __repr__(&self) -> String {

@@ -13,7 +13,7 @@ from conftest import program
 
 @pytest.fixture(scope="session")
 def manifest(flight: Path) -> Path:
-    rows = [f"run-{i},{'a' if i % 2 else 'b'},flight,flight/labels/floor.csv,flight/estimates/{name}.txt" for i, name in enumerate(["drift", "exact", "clock-offset", "drift"])]
+    rows = [f"run-{i},{'a' if i % 2 else 'b'},flight,flight/labels/floor.csv,flight/estimates/{name}.txt" for i, name in enumerate(["drift", "exact", "clock-offset", "white-noise"])]
     path = flight.parent / "fleet.csv"
     path.write_text("run_id,group,dataset,labels,estimate\n" + "\n".join(rows) + "\n")
     return path
@@ -30,7 +30,7 @@ def test_a_batch_has_the_bytes_of_the_program(manifest: Path, tmp_path: Path) ->
     batch = vice.batch(manifest, tmp_path / "m", progress=lambda *step: told.append(step))
     assert (batch.total, batch.done, batch.skipped, batch.failed) == (4, 4, 0, 0)
     assert told[-1] == ("runs", 4, 4)
-    assert files(tmp_path / "m") == files(tmp_path / "p") and len(files(tmp_path / "p")) == 3
+    assert files(tmp_path / "m") == files(tmp_path / "p") and len(files(tmp_path / "p")) == 4
     again = vice.batch(manifest, tmp_path / "m")
     assert (again.done, again.skipped) == (0, 4)
     assert vice.collect(tmp_path / "m")[1:] == (0, 0)

@@ -85,9 +85,12 @@ def _without_none(values: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in values.items() if value is not None}
 
 
-def _snake(word: str | None) -> str | None:
-    """An option's word as requests have it."""
-    return None if word is None else word.replace("-", "_")
+def _number(value: float | None) -> float | None:
+    return None if value is None else float(value)
+
+
+def _numbers(values: Sequence[float] | None) -> list[float] | None:
+    return None if values is None else [float(value) for value in values]
 
 
 def _text(path: PathLike | None) -> str | None:
@@ -161,23 +164,21 @@ def _request(
     align: str | None = None,
 ) -> str:
     """The request without the run, the labels and the streams: plain data, as a file of ``vice evaluate --request``."""
-    floats = lambda values: None if values is None else [float(v) for v in values]  # noqa: E731
-    number = lambda value: None if value is None else float(value)  # noqa: E731
     request = {
         "dataset": _without_none(
-            {"camera": camera, "calibration": _text(calibration), "floor_plane": floats(floor_plane)}
+            {"camera": camera, "calibration": _text(calibration), "floor_plane": _numbers(floor_plane)}
         ),
         "labels": {"file": "", **_without_none({"points": _list(points), "observations": observations})},
-        "protocol": _without_none({"fps": number(fps), "start_s": number(start), "duration_s": number(duration)}),
+        "protocol": _without_none({"fps": _number(fps), "start_s": _number(start), "duration_s": _number(duration)}),
         "streams": _without_none(
             {
                 "estimate_frame": _text(estimate_frame),
                 "estimate_as": _list(estimate_as),
                 "times": _text(times),
-                "time_offset_s": number(time_offset),
-                "max_gap_s": number(max_gap),
+                "time_offset_s": _number(time_offset),
+                "max_gap_s": _number(max_gap),
                 "anchor": anchor,
-                "initial_pose": floats(initial_pose),
+                "initial_pose": _numbers(initial_pose),
             }
         ),
         "depth": _without_none(
@@ -185,14 +186,14 @@ def _request(
                 "sources": _list(depth),
                 "zmap_occlusion": zmap_occlusion,
                 "zmap_interpolation": zmap_interpolation,
-                "cloud_voxel_m": number(cloud_voxel),
-                "zcam_range_m": floats(zcam_range),
-                "tag_size_m": number(tag_size),
+                "cloud_voxel_m": _number(cloud_voxel),
+                "zcam_range_m": _numbers(zcam_range),
+                "tag_size_m": _number(tag_size),
                 "tag_family": tag_family,
                 "compare": depth_check,
             }
         ),
-        "scoring": _without_none({"subsets": _list(subsets), "align": _snake(align)}),
+        "scoring": _without_none({"subsets": _list(subsets), "align": align}),
     }
     try:
         return json.dumps(request, allow_nan=False)

@@ -25,7 +25,7 @@ def program(*args: str | os.PathLike[str], check: bool = True) -> str:
     Error
         Any other exit code but 0, unless ``check`` is false.
     """
-    words = [sys.executable, "-m", "vicepose", *map(os.fspath, args)]
+    words = [sys.executable, "-m", "vicepose", *(os.fspath(arg) for arg in args)]
     done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
     if check and done.returncode:
         lines = [line.removeprefix("error: ") for line in done.stderr.splitlines() if not line.startswith("warning: ")]

@@ -93,7 +93,7 @@ def evo_arrays(traj: Any) -> tuple[Any, Any, Any]:
 
 def to_evo(trajectory: Any) -> Any:
     """evo's PoseTrajectory3D."""
-    from evo.core.trajectory import PoseTrajectory3D
+    from evo.core.trajectory import PoseTrajectory3D  # type: ignore[import-untyped,import-not-found,unused-ignore]
 
     return PoseTrajectory3D(
         positions_xyz=trajectory.xyz,

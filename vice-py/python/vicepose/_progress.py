@@ -65,7 +65,7 @@ def shown(progress: Progress) -> Iterator[Callback | None]:
         return
     bar: _Plain | _Tqdm
     try:
-        from tqdm.auto import tqdm
+        from tqdm.auto import tqdm  # type: ignore[import-untyped,import-not-found,unused-ignore]
     except ImportError:
         bar = _Plain()
     else:

@@ -104,7 +104,7 @@ def compare(
         "reference": "",
         "estimate": "",
         "estimate_as": estimate_as,
-        "align": align.replace("-", "_"),
+        "align": align,
         "n_to_align": n_to_align,
         "t_max_diff_s": t_max_diff,
         "t_offset_s": float(t_offset),
