@@ -44,7 +44,7 @@ mod _vicepose {
     #[pymodule_export]
     use super::poses::Trajectory;
     #[pymodule_export]
-    use super::program::{command_names, demo, main, panic_for_tests, synth, work_for_tests};
+    use super::program::{command_names, demo, main, panic_for_tests, synth, time_of_batch, work_for_tests};
     #[pymodule_export]
     use super::recording::{Recording, open_object, open_path};
     #[pymodule_export]

@@ -2,11 +2,13 @@
 
 use std::ffi::OsString;
 use std::path::PathBuf;
+use std::time::Instant;
 
 use pyo3::prelude::*;
 use vice_cli::{Itself, commands, main_from};
 use vice_run::synthetic::{Synthetic, SyntheticOptions, write_euroc};
 
+use crate::camera::Camera;
 use crate::errors::Answer;
 use crate::work::long;
 
@@ -49,6 +51,21 @@ pub(crate) fn synth(
         let flight = Synthetic::new(options)?;
         Ok(write_euroc(&flight, &out, force, &|done, total| progress("rendering", done, total))?)
     })
+}
+
+/// Median seconds that the Rust batch takes for points in structure-of-arrays form: what `Camera.project` is held against.
+#[pyfunction]
+pub(crate) fn time_of_batch(camera: &Camera, x: Vec<f64>, y: Vec<f64>, z: Vec<f64>, repeats: usize) -> f64 {
+    let (mut u, mut v, mut valid) = (vec![0.0; x.len()], vec![0.0; x.len()], vec![false; x.len()]);
+    let mut times: Vec<f64> = (0..repeats.max(1))
+        .map(|_| {
+            let begun = Instant::now();
+            camera.core.project_batch([&x, &y, &z], [&mut u, &mut v], &mut valid);
+            begun.elapsed().as_secs_f64()
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
 }
 
 /// Panics, so that tests see what becomes of it.
