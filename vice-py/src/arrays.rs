@@ -1,6 +1,8 @@
 //! Arrays of NumPy as slices, without a copy where they are contiguous doubles.
 
-use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{
+    Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 use crate::errors::{Answer, Failure, OfPython, usage};
@@ -18,7 +20,8 @@ impl<'py> Rows<'py> {
     /// # Errors
     /// A usage error for another shape.
     pub(crate) fn of<const N: usize>(object: &Bound<'py, PyAny>, name: &'static str) -> Answer<Self> {
-        let wrong = |shape: &[usize]| usage(name, format!("an array of shape (N, {N}) is expected, not {shape:?}"));
+        let wrong =
+            |shape: &[usize]| usage(name, format!("an array of shape (N, {N}) is expected, not {shape:?}"));
         let given = object.extract::<PyReadonlyArray2<'py, f64>>().ok().filter(|a| a.is_c_contiguous());
         let rows = match given {
             Some(rows) => rows,
@@ -53,14 +56,21 @@ pub(crate) fn column<'py, T: Element>(
 }
 
 /// Stamps: integer nanoseconds, never floating-point numbers, which lose them.
-pub(crate) fn stamps<'py>(object: &Bound<'py, PyAny>, name: &'static str) -> Answer<PyReadonlyArray1<'py, i64>> {
+pub(crate) fn stamps<'py>(
+    object: &Bound<'py, PyAny>,
+    name: &'static str,
+) -> Answer<PyReadonlyArray1<'py, i64>> {
     let numpy = object.py().import("numpy").python()?;
     let array = numpy.call_method1("asarray", (object,)).python()?;
-    let kind: String = array.getattr("dtype").and_then(|d| d.getattr("kind")).and_then(|k| k.extract()).python()?;
+    let kind: String =
+        array.getattr("dtype").and_then(|d| d.getattr("kind")).and_then(|k| k.extract()).python()?;
     match kind.as_str() {
         "i" | "u" => column(&array, "int64", name),
         "M" => column(&array.call_method1("astype", ("datetime64[ns]",)).python()?, "int64", name),
-        _ => Err(usage(name, "stamps are integer nanoseconds (int64 or datetime64); doubles of seconds lose some hundred of them")),
+        _ => Err(usage(
+            name,
+            "stamps are integer nanoseconds (int64 or datetime64); doubles of seconds lose some hundred of them",
+        )),
     }
 }
 

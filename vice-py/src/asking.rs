@@ -42,7 +42,8 @@ impl Asked {
         let mut value: serde_json::Value = serde_json::from_str(request)?;
         // The run says where it is; the call may only override parts of it.
         value["dataset"]["path"] = "".into();
-        let mut request: Request = serde_json::from_value(value).map_err(|e| usage("request", e.to_string()))?;
+        let mut request: Request =
+            serde_json::from_value(value).map_err(|e| usage("request", e.to_string()))?;
         let over = request.dataset;
         request.dataset = DatasetSpec {
             camera: over.camera.or_else(|| run.spec.camera.clone()),
@@ -91,7 +92,8 @@ fn spec_of(memory: &mut InMemory, name: Option<&str>, given: &Bound<'_, PyAny>) 
         return Ok(EstimateSpec::from(text.to_string()));
     }
     let path = given.extract::<PathBuf>();
-    let path = path.map_err(|_| usage("estimates", "a Trajectory, or the name of a stream or file, is expected"))?;
+    let path =
+        path.map_err(|_| usage("estimates", "a Trajectory, or the name of a stream or file, is expected"))?;
     Ok(EstimateSpec::from(path.display().to_string()))
 }
 
@@ -129,7 +131,11 @@ pub(crate) fn evaluate(
 /// Evaluates what a request in a file, or that of a result document, asks for.
 #[pyfunction]
 #[pyo3(signature = (path, progress = None))]
-pub(crate) fn evaluate_request(py: Python<'_>, path: PathBuf, progress: Option<Py<PyAny>>) -> Answer<Outcome> {
+pub(crate) fn evaluate_request(
+    py: Python<'_>,
+    path: PathBuf,
+    progress: Option<Py<PyAny>>,
+) -> Answer<Outcome> {
     let (document, dataset) = long(py, progress.as_ref(), move |progress| {
         let request = Request::read(&path)?;
         let opened = request.open()?;
@@ -162,7 +168,8 @@ pub(crate) fn diagnose(
             return Err(RunError::usage("depth", "a diagnosis is of one estimate with one depth source"));
         };
         let (result, calibration) = answer.outcome?;
-        let calibration = calibration.map(|file| file.to_toml().into_bytes()).map_err(|e| e.problem().to_string());
+        let calibration =
+            calibration.map(|file| file.to_toml().into_bytes()).map_err(|e| e.problem().to_string());
         let text = diagnosis_text::render(&result.diagnosis);
         let json = serde_json::to_string(&result)? + "\n";
         Ok(Document::new(json, text).with_or_why("toml", calibration).suspecting(suspicions))

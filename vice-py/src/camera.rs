@@ -39,7 +39,12 @@ impl Camera {
     #[new]
     #[pyo3(signature = (size, K, model = "pinhole", D = None))]
     #[allow(non_snake_case, reason = "what OpenCV's users call them")]
-    fn new(size: (u32, u32), K: &Bound<'_, PyAny>, model: &str, D: Option<&Bound<'_, PyAny>>) -> Answer<Self> {
+    fn new(
+        size: (u32, u32),
+        K: &Bound<'_, PyAny>,
+        model: &str,
+        D: Option<&Bound<'_, PyAny>>,
+    ) -> Answer<Self> {
         let intrinsics = intrinsics(K)?;
         let coefficients = D.map(flat).transpose()?.unwrap_or_default();
         let wrong = |e: vice_run::core::camera::CameraError| usage("camera", e.to_string());
@@ -151,7 +156,9 @@ fn into_rows<'py, const N: usize>(
 ) -> Answer<Bound<'py, PyArray2<f64>>> {
     let out = match out {
         None => PyArray2::<f64>::zeros(py, [count, N], false),
-        Some(out) => out.cast_into::<PyArray2<f64>>().map_err(|_| usage("out", "an array of float64 with two axes is expected"))?,
+        Some(out) => out
+            .cast_into::<PyArray2<f64>>()
+            .map_err(|_| usage("out", "an array of float64 with two axes is expected"))?,
     };
     if out.shape() != [count, N] {
         return Err(usage("out", format!("the shape ({count}, {N}) is expected, not {:?}", out.shape())));
@@ -163,7 +170,12 @@ fn into_rows<'py, const N: usize>(
         let mut borrowed = out.try_readwrite().map_err(not_writable("out"))?;
         let to = borrowed.as_slice_mut().map_err(|_| usage("out", "a contiguous array is expected"))?;
         let to = to.as_chunks_mut::<N>().0;
-        py.detach(|| guarded(|| Ok(fill(to))))?;
+        py.detach(|| {
+            guarded(|| {
+                fill(to);
+                Ok(())
+            })
+        })?;
     }
     Ok(out)
 }
@@ -181,9 +193,15 @@ fn intrinsics(object: &Bound<'_, PyAny>) -> Answer<[f64; 4]> {
             if [skew, zero_1, zero_2, zero_3].iter().all(|v| **v == 0.0) && *one == 1.0 {
                 Ok([*fx, *fy, *cx, *cy])
             } else {
-                Err(usage("K", "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]] is expected: there is no camera with a skew"))
+                Err(usage(
+                    "K",
+                    "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]] is expected: there is no camera with a skew",
+                ))
             }
         }
-        other => Err(usage("K", format!("a matrix of shape (3, 3) or (fx, fy, cx, cy) is expected, not {} numbers", other.len()))),
+        other => Err(usage(
+            "K",
+            format!("a matrix of shape (3, 3) or (fx, fy, cx, cy) is expected, not {} numbers", other.len()),
+        )),
     }
 }

@@ -48,7 +48,10 @@ impl Document {
             ))),
             None => {
                 let known: Vec<&str> = self.forms.keys().copied().collect();
-                Err(usage("path", format!("there is no form `{ending}` of it; there are json, {}", known.join(", "))))
+                Err(usage(
+                    "path",
+                    format!("there is no form `{ending}` of it; there are json, {}", known.join(", ")),
+                ))
             }
         }
     }
@@ -120,7 +123,8 @@ impl Document {
     ///
     /// A form as text: ``csv``, ``tex``, ``svg``, ``toml``.
     fn text(&self, form: &str) -> Answer<String> {
-        String::from_utf8(self.form(form)?.to_vec()).map_err(|_| missing(format!("the form {form} is no text: save it")))
+        String::from_utf8(self.form(form)?.to_vec())
+            .map_err(|_| missing(format!("the form {form} is no text: save it")))
     }
 
     fn __str__(&self) -> &str {
@@ -132,7 +136,8 @@ impl Document {
     }
 
     fn _repr_html_(&self, py: Python<'_>) -> Answer<String> {
-        let escaped = py.import("html").and_then(|h| h.call_method1("escape", (&self.text,))?.extract::<String>());
+        let escaped =
+            py.import("html").and_then(|h| h.call_method1("escape", (&self.text,))?.extract::<String>());
         Ok(format!("<pre>{}</pre>", escaped.python()?))
     }
 }

@@ -44,7 +44,10 @@ impl Batch {
 
     fn __repr__(&self) -> String {
         let Self { total, done, skipped, failed, .. } = self;
-        format!("<vicepose.Batch in {}: {total} runs, {done} evaluated, {skipped} were there, {failed} failed>", self.folder.display())
+        format!(
+            "<vicepose.Batch in {}: {total} runs, {done} evaluated, {skipped} were there, {failed} failed>",
+            self.folder.display()
+        )
     }
 }
 
@@ -71,7 +74,9 @@ pub(crate) fn batch(
         let manifest = Manifest::read(&manifest)?;
         let errors = std::sync::Mutex::new(Vec::new());
         let summary = run_batch(&manifest, &Store::new(&out), &options, told.stop(), &|event| {
-            if let (State::Failed, Some(error), Ok(mut errors)) = (event.state, &event.record.error, errors.lock()) {
+            if let (State::Failed, Some(error), Ok(mut errors)) =
+                (event.state, &event.record.error, errors.lock())
+            {
                 errors.push((event.record.run_id.clone(), error.clone()));
             }
             told.tell("runs", event.summary.ended(), event.summary.total);
@@ -147,7 +152,11 @@ impl FleetTable {
 #[pyfunction]
 pub(crate) fn table(py: Python<'_>, results: PathBuf) -> Answer<FleetTable> {
     let rows = long(py, None, move |_| -> RunResult<Vec<ResultRow>> {
-        if results.is_dir() { Ok(collect_store(&Store::new(&results))?.rows) } else { Ok(results::read(&results)?) }
+        if results.is_dir() {
+            Ok(collect_store(&Store::new(&results))?.rows)
+        } else {
+            Ok(results::read(&results)?)
+        }
     })?;
     Ok(FleetTable { rows })
 }

@@ -30,9 +30,18 @@ impl PythonFormat {
             value.map_or_else(|| Ok(default.to_string()), |v| v.extract().python())
         };
         let name = class.getattr("__name__").and_then(|n| n.extract::<String>()).unwrap_or_default();
-        let offers = class.getattr_opt("offers").python()?.map(|o| o.extract::<Vec<String>>()).transpose().python()?;
-        let settings = class.getattr_opt("settings").python()?.map(|s| s.extract::<std::collections::BTreeMap<String, String>>()).transpose().python()?;
-        let settings = settings.unwrap_or_default().into_iter().map(|(key, description)| SettingInfo { key, description });
+        let offers =
+            class.getattr_opt("offers").python()?.map(|o| o.extract::<Vec<String>>()).transpose().python()?;
+        let settings = class
+            .getattr_opt("settings")
+            .python()?
+            .map(|s| s.extract::<std::collections::BTreeMap<String, String>>())
+            .transpose()
+            .python()?;
+        let settings = settings
+            .unwrap_or_default()
+            .into_iter()
+            .map(|(key, description)| SettingInfo { key, description });
         let info = FormatInfo {
             name: text("format_name", &name.to_ascii_lowercase())?,
             description: text("description", &format!("the Python class {name}"))?,
@@ -68,10 +77,15 @@ impl DatasetFactory for PythonFormat {
             let class = self.class.bind(py);
             let object = match &self.stands_for {
                 Some(own) if own == path => Ok(class.clone()),
-                Some(_) => return Err(DataError::of_kind(ErrorKind::Missing, "is not what the object stands for").at(path)),
+                Some(_) => {
+                    return Err(
+                        DataError::of_kind(ErrorKind::Missing, "is not what the object stands for").at(path)
+                    );
+                }
                 None => {
                     let settings = PyDict::new(py);
-                    let set = options.settings.iter().try_for_each(|(key, value)| settings.set_item(key, value));
+                    let set =
+                        options.settings.iter().try_for_each(|(key, value)| settings.set_item(key, value));
                     set.and_then(|()| class.call((path,), Some(&settings)))
                 }
             };
@@ -90,8 +104,20 @@ pub(crate) fn known() -> Vec<Box<dyn DatasetFactory>> {
             .import("vicepose._formats")
             .and_then(|module| module.call_method0("all_formats"))
             .and_then(|list| list.cast_into::<PyList>().map_err(Into::into));
-        let Ok(found) = found else { return Vec::new() };
-        let classes = found.iter().filter_map(|class| PythonFormat::new(&class).ok());
+        let found = match found {
+            Ok(found) => found,
+            Err(error) => {
+                tracing::warn!("formats written in Python are left out: {error}");
+                return Vec::new();
+            }
+        };
+        let classes = found.iter().filter_map(|class| match PythonFormat::new(&class) {
+            Ok(format) => Some(format),
+            Err(failure) => {
+                tracing::warn!("the format {class} is left out: {}", PyErr::from(failure));
+                None
+            }
+        });
         classes.map(|format| Box::new(format) as Box<dyn DatasetFactory>).collect()
     })
 }
@@ -124,10 +150,18 @@ pub(crate) fn check_format(
             format.stands_for = Some(own.clone());
             own
         }
-        (None, true) => return Err(usage("path", "name a data set of the format, or give an object in place of the class")),
-        (Some(_), false) => return Err(usage("path", "an object is open already: leave the path out, or give the class")),
+        (None, true) => {
+            return Err(usage(
+                "path",
+                "name a data set of the format, or give an object in place of the class",
+            ));
+        }
+        (Some(_), false) => {
+            return Err(usage("path", "an object is open already: leave the path out, or give the class"));
+        }
     };
-    let thorough = Thoroughness { cycles, images, cycles_within: Duration::from_secs(20), ..Thoroughness::default() };
+    let thorough =
+        Thoroughness { cycles, images, cycles_within: Duration::from_secs(20), ..Thoroughness::default() };
     long(py, progress.as_ref(), move |progress| {
         let options = OpenOptions::default();
         let subject = Subject { factory: &format, plugin: None, path: &path, options: &options };

@@ -15,6 +15,7 @@ use crate::arrays::{Rows, column, stamps};
 use crate::errors::{Answer, OfPython, usage};
 use crate::recording::Recording;
 use crate::table::{Table, flags, integers, numbers, words};
+use crate::work::short;
 
 /// Labels(point, ns, uv, keyframe, source=None, occluded=None, uncertain=None)
 /// --
@@ -74,7 +75,10 @@ impl Labels {
         let (occluded, uncertain) = (of_flags(occluded, "occluded")?, of_flags(uncertain, "uncertain")?);
         let lengths = [point.len(), uv.len(), keyframe.len(), occluded.len(), uncertain.len()];
         if lengths.iter().any(|n| *n != ns.len()) || source.as_ref().is_some_and(|s| s.len() != ns.len()) {
-            return Err(usage("labels", format!("the columns differ in length from ns, which has {}", ns.len())));
+            return Err(usage(
+                "labels",
+                format!("the columns differ in length from ns, which has {}", ns.len()),
+            ));
         }
         let mut rows = Vec::with_capacity(ns.len());
         for (i, point) in point.into_iter().enumerate() {
@@ -101,9 +105,12 @@ impl Labels {
     /// Labels from a file: CSV, JSON, CVAT's XML, the authors' pickle. The last two count frames, and so need the run.
     #[classmethod]
     #[pyo3(signature = (path, run = None))]
-    fn read(_: &Bound<'_, PyType>, path: PathBuf, run: Option<&Recording>) -> Answer<Self> {
-        let frames = run.map(|run| run.opened_default()).transpose()?.map(|opened| opened.frames);
-        Ok(Self::of(labels::read(&path, frames.as_deref())?))
+    fn read(_: &Bound<'_, PyType>, py: Python<'_>, path: PathBuf, run: Option<&Recording>) -> Answer<Self> {
+        let core = short(py, || {
+            let frames = run.map(Recording::opened_default).transpose()?.map(|opened| opened.frames);
+            Ok(labels::read(&path, frames.as_deref())?)
+        })?;
+        Ok(Self::of(core))
     }
 
     /// write(path, overwrite=False)
@@ -172,13 +179,18 @@ impl Labels {
         // Not whether they stood in the same lines of a file.
         let rows = |labels: &LabelSet| -> Vec<(String, Observation)> {
             let all = labels.points().iter();
-            all.flat_map(|p| p.observations.iter().map(|o| (p.name.clone(), Observation { line: 0, ..*o }))).collect()
+            all.flat_map(|p| p.observations.iter().map(|o| (p.name.clone(), Observation { line: 0, ..*o })))
+                .collect()
         };
         other.cast::<Self>().is_ok_and(|other| rows(&other.get().core) == rows(&self.core))
     }
 
     fn __repr__(&self) -> String {
-        format!("<vicepose.Labels of {} points, {} labels>", self.core.points().len(), self.core.observation_count())
+        format!(
+            "<vicepose.Labels of {} points, {} labels>",
+            self.core.points().len(),
+            self.core.observation_count()
+        )
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyAny>,))> {

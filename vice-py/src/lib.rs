@@ -18,6 +18,7 @@ mod recording;
 mod result;
 mod robot;
 mod table;
+mod warnings;
 mod work;
 
 use pyo3::prelude::*;

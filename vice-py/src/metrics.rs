@@ -29,8 +29,15 @@ pub(crate) struct Pairing {
 }
 
 impl Pairing {
-    fn pairs(self, reference: &Trajectory, estimate: &Trajectory) -> Answer<impl FnOnce() -> RunResult<(PosePairs, ReferenceFromEstimate)> + Send + 'static> {
-        let how: Alignment = self.align.parse().map_err(|e: <Alignment as std::str::FromStr>::Err| usage("align", e.to_string()))?;
+    fn pairs(
+        self,
+        reference: &Trajectory,
+        estimate: &Trajectory,
+    ) -> Answer<impl FnOnce() -> RunResult<(PosePairs, ReferenceFromEstimate)> + Send + 'static> {
+        let how: Alignment = self
+            .align
+            .parse()
+            .map_err(|e: <Alignment as std::str::FromStr>::Err| usage("align", e.to_string()))?;
         let matching = Matching::Nearest { t_max_diff: Span::from_secs_f64(self.t_max_diff)? };
         let offset = Span::from_secs_f64(self.t_offset)?;
         let (reference, estimate) = (reference.core.clone(), estimate.core.clone());
@@ -42,9 +49,21 @@ impl Pairing {
     }
 }
 
-fn statistics<'py>(py: Python<'py>, s: &Statistics, errors: Bound<'py, PyArray1<f64>>) -> PyResult<Bound<'py, PyDict>> {
+fn statistics<'py>(
+    py: Python<'py>,
+    s: &Statistics,
+    errors: Bound<'py, PyArray1<f64>>,
+) -> PyResult<Bound<'py, PyDict>> {
     let values = PyDict::new(py);
-    let numbers = [("rmse", s.rmse), ("mean", s.mean), ("median", s.median), ("std", s.std), ("min", s.min), ("max", s.max), ("sse", s.sse)];
+    let numbers = [
+        ("rmse", s.rmse),
+        ("mean", s.mean),
+        ("median", s.median),
+        ("std", s.std),
+        ("min", s.min),
+        ("max", s.max),
+        ("sse", s.sse),
+    ];
     for (name, value) in numbers {
         values.set_item(name, value)?;
     }
@@ -54,7 +73,12 @@ fn statistics<'py>(py: Python<'py>, s: &Statistics, errors: Bound<'py, PyArray1<
 
 /// Absolute pose errors.
 #[pyfunction]
-pub(crate) fn ape<'py>(py: Python<'py>, reference: &Trajectory, estimate: &Trajectory, pairing: Pairing) -> Answer<Bound<'py, PyDict>> {
+pub(crate) fn ape<'py>(
+    py: Python<'py>,
+    reference: &Trajectory,
+    estimate: &Trajectory,
+    pairing: Pairing,
+) -> Answer<Bound<'py, PyDict>> {
     let pairs = pairing.pairs(reference, estimate)?;
     let (pairs, transform, errors, all, summary) = long(py, None, move |_| {
         let (pairs, transform) = pairs()?;
@@ -92,7 +116,9 @@ pub(crate) fn rpe<'py>(
     all_pairs: bool,
     pairs_from_reference: bool,
 ) -> Answer<Bound<'py, PyDict>> {
-    let unit: DeltaUnit = delta_unit.parse().map_err(|e: <DeltaUnit as std::str::FromStr>::Err| usage("delta_unit", e.to_string()))?;
+    let unit: DeltaUnit = delta_unit
+        .parse()
+        .map_err(|e: <DeltaUnit as std::str::FromStr>::Err| usage("delta_unit", e.to_string()))?;
     let options = RpeOptions {
         delta: Delta::new(delta, unit)?,
         mode: if all_pairs { PairMode::All } else { PairMode::Consecutive },
@@ -105,7 +131,10 @@ pub(crate) fn rpe<'py>(
         let all = errors.statistics()?;
         Ok((pairs, errors, all))
     })?;
-    let ends = array_of(py, errors.pairs.iter().map(|(_, to)| pairs.stamps()[*to].as_nanos()).collect::<Vec<_>>().into_iter());
+    let ends = array_of(
+        py,
+        errors.pairs.iter().map(|(_, to)| pairs.stamps()[*to].as_nanos()).collect::<Vec<_>>().into_iter(),
+    );
     let values = PyDict::new(py);
     let array = |numbers: Vec<f64>| array_of(py, numbers.into_iter());
     let set = || -> PyResult<()> {
@@ -131,11 +160,14 @@ pub(crate) fn compare_trajectories(
     for (field, given) in [("reference", reference), ("estimate", estimate)] {
         let name = match given.cast::<Trajectory>() {
             Ok(trajectory) => memory.add_trajectory(field, trajectory.get().core.as_ref().clone()),
-            Err(_) => given.cast::<PyString>().map_or_else(|_| given.str(), |s| Ok(s.clone())).python()?.to_string(),
+            Err(_) => {
+                given.cast::<PyString>().map_or_else(|_| given.str(), |s| Ok(s.clone())).python()?.to_string()
+            }
         };
         value[field] = name.into();
     }
-    let request: TrajectoryRequest = serde_json::from_value(value).map_err(|e| usage("request", e.to_string()))?;
+    let request: TrajectoryRequest =
+        serde_json::from_value(value).map_err(|e| usage("request", e.to_string()))?;
     let (document, table, plot, archive) = long(py, None, move |_| {
         let compared = compare_in_memory(&request, &memory)?;
         let json = serde_json::to_string(&compared.document)?;

@@ -203,7 +203,11 @@ impl Trajectory {
     fn __repr__(&self) -> String {
         let (first, last) = (self.core.start(), self.core.end());
         let seconds = last.since(first).as_secs_f64();
-        format!("<vicepose.Trajectory of {} poses, {first} to {last} ns ({seconds:.2} s), path {:.2} m>", self.core.len(), self.length_m())
+        format!(
+            "<vicepose.Trajectory of {} poses, {first} to {last} ns ({seconds:.2} s), path {:.2} m>",
+            self.core.len(),
+            self.length_m()
+        )
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {

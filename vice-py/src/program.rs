@@ -30,7 +30,12 @@ pub(crate) fn command_names() -> Vec<String> {
 /// What `vice demo` prints.
 #[pyfunction]
 #[pyo3(signature = (out = None, force = false, progress = None))]
-pub(crate) fn demo(py: Python<'_>, out: Option<PathBuf>, force: bool, progress: Option<Py<PyAny>>) -> Answer<String> {
+pub(crate) fn demo(
+    py: Python<'_>,
+    out: Option<PathBuf>,
+    force: bool,
+    progress: Option<Py<PyAny>>,
+) -> Answer<String> {
     long(py, progress.as_ref(), move |progress| vice_run::demo::run(out.as_deref(), force, progress))
 }
 
@@ -46,7 +51,8 @@ pub(crate) fn synth(
     force: bool,
     progress: Option<Py<PyAny>>,
 ) -> Answer<()> {
-    let options = SyntheticOptions { seed, duration_s: duration, rate_hz: rate, ..SyntheticOptions::default() };
+    let options =
+        SyntheticOptions { seed, duration_s: duration, rate_hz: rate, ..SyntheticOptions::default() };
     long(py, progress.as_ref(), move |progress| {
         let flight = Synthetic::new(options)?;
         Ok(write_euroc(&flight, &out, force, &|done, total| progress("rendering", done, total))?)
@@ -78,7 +84,12 @@ pub(crate) fn panic_for_tests(py: Python<'_>) -> Answer<()> {
 /// Works on for so many seconds, reporting progress or not, so that tests can stop it.
 #[pyfunction]
 #[pyo3(signature = (seconds, reports = true, progress = None))]
-pub(crate) fn work_for_tests(py: Python<'_>, seconds: f64, reports: bool, progress: Option<Py<PyAny>>) -> Answer<()> {
+pub(crate) fn work_for_tests(
+    py: Python<'_>,
+    seconds: f64,
+    reports: bool,
+    progress: Option<Py<PyAny>>,
+) -> Answer<()> {
     long(py, progress.as_ref(), move |progress| {
         let steps = (seconds * 100.0) as usize;
         for step in 0..steps {

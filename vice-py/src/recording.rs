@@ -17,10 +17,10 @@ use vice_run::{formats, info};
 
 use crate::arrays::{array_of, array_of_rows};
 use crate::camera::Camera;
-use crate::errors::{Answer, OfPython, missing};
+use crate::errors::{Answer, OfPython};
 use crate::poses::Trajectory;
 use crate::robot::Robot;
-use crate::work::long;
+use crate::work::{long, short};
 
 /// A recorded run of one robot, as :func:`vicepose.open` gives it. Nothing is decoded that is not asked for.
 #[pyclass(frozen, name = "Run", module = "vicepose")]
@@ -111,7 +111,7 @@ impl Recording {
     /// Stamps of a camera's frames, int64 nanoseconds of shape (N,). The place in this array is the frame's index.
     #[pyo3(signature = (camera = None))]
     fn frames_of<'py>(&self, py: Python<'py>, camera: Option<String>) -> Answer<Bound<'py, PyArray1<i64>>> {
-        let frames = self.dataset.frames(&self.camera_name(camera)?)?;
+        let frames = short(py, || Ok(self.dataset.frames(&self.camera_name(camera)?)?))?;
         Ok(array_of(py, frames.iter().map(|s| s.as_nanos())))
     }
 
@@ -120,8 +120,9 @@ impl Recording {
     ///
     /// Intrinsics of a camera.
     #[pyo3(signature = (name = None))]
-    fn camera(&self, name: Option<String>) -> Answer<Camera> {
-        Ok(Camera { core: self.dataset.camera(&self.camera_name(name)?)? })
+    fn camera(&self, py: Python<'_>, name: Option<String>) -> Answer<Camera> {
+        let core = short(py, || Ok(self.dataset.camera(&self.camera_name(name)?)?))?;
+        Ok(Camera { core })
     }
 
     /// body_from_camera(ns=None, camera=None)
@@ -129,12 +130,23 @@ impl Recording {
     ///
     /// Pose of a camera in the body at a stamp (the first frame's where none is given), array of shape (4, 4), metres.
     #[pyo3(signature = (ns = None, camera = None))]
-    fn body_from_camera<'py>(&self, py: Python<'py>, ns: Option<i64>, camera: Option<String>) -> Answer<Bound<'py, PyArray2<f64>>> {
-        let camera = self.camera_name(camera)?;
-        let first = || self.dataset.frames(&camera).ok()?.first().copied();
-        let stamp = ns.map(Stamp::from_nanos).or_else(first);
-        let stamp = stamp.ok_or_else(|| missing(format!("camera {camera} has no frames")))?;
-        let pose = self.dataset.body_from_camera(&camera, stamp)?;
+    fn body_from_camera<'py>(
+        &self,
+        py: Python<'py>,
+        ns: Option<i64>,
+        camera: Option<String>,
+    ) -> Answer<Bound<'py, PyArray2<f64>>> {
+        let pose = short(py, || {
+            let camera = self.camera_name(camera)?;
+            let stamp = match ns {
+                Some(ns) => Stamp::from_nanos(ns),
+                None => {
+                    let first = self.dataset.frames(&camera)?.first().copied();
+                    first.ok_or_else(|| RunError::missing(format!("camera {camera} has no frames")))?
+                }
+            };
+            Ok(self.dataset.body_from_camera(&camera, stamp)?)
+        })?;
         array_of_rows(py, pose.to_row_major().as_chunks::<4>().0.to_vec().into_iter())
     }
 
@@ -170,9 +182,16 @@ impl Recording {
     /// Depth along the optical axis that is registered to a frame, float32 metres of shape (rows, columns), NaN where
     /// there is none; None where the frame has no depth image.
     #[pyo3(signature = (index, camera = None))]
-    fn depth_image<'py>(&self, py: Python<'py>, index: usize, camera: Option<String>) -> Answer<Option<Bound<'py, PyArray2<f32>>>> {
+    fn depth_image<'py>(
+        &self,
+        py: Python<'py>,
+        index: usize,
+        camera: Option<String>,
+    ) -> Answer<Option<Bound<'py, PyArray2<f32>>>> {
         let (dataset, camera) = (Arc::clone(&self.dataset), self.camera_name(camera)?);
-        let Some(image) = long(py, None, move |_| Ok(dataset.depth_image(&camera, index)?))? else { return Ok(None) };
+        let Some(image) = long(py, None, move |_| Ok(dataset.depth_image(&camera, index)?))? else {
+            return Ok(None);
+        };
         let shape = [image.height() as usize, image.width() as usize];
         PyArray1::from_slice(py, image.z_m()).reshape(shape).python().map(Some)
     }
@@ -183,7 +202,10 @@ impl Recording {
     /// Inertial samples in the body: (ns of shape (N,), angular rates in rad/s and specific forces in m/s², each of
     /// shape (N, 3)). Empty where the robot has none.
     #[allow(clippy::type_complexity, reason = "three arrays")]
-    fn imu<'py>(&self, py: Python<'py>) -> Answer<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+    fn imu<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> Answer<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
         let dataset = Arc::clone(&self.dataset);
         let samples = long(py, None, move |_| Ok(dataset.imu()?))?;
         Ok((
@@ -217,16 +239,31 @@ impl Recording {
     }
 
     fn __repr__(&self) -> String {
-        format!("<vicepose.Run {} ({}): cameras {:?}, streams {:?}>", self.dataset.name(), self.dataset.format(), self.cameras(), self.streams())
+        format!(
+            "<vicepose.Run {} ({}): cameras {:?}, streams {:?}>",
+            self.dataset.name(),
+            self.dataset.format(),
+            self.cameras(),
+            self.streams()
+        )
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, spec) = (slf.py(), &slf.get().spec);
         if vice_run::in_memory::is_in_memory(&spec.path.to_string_lossy()) {
-            let robot = RunError::new(ErrorKind::Unsupported, "a run that is an object of Python is not pickled: pickle the object, and open it there");
+            let robot = RunError::new(
+                ErrorKind::Unsupported,
+                "a run that is an object of Python is not pickled: pickle the object, and open it there",
+            );
             return Err(crate::errors::Failure::Run(robot).into());
         }
-        let arguments = (spec.path.clone(), spec.format.clone(), spec.set.clone(), spec.plugins.files.clone(), spec.plugins.allow_writable);
+        let arguments = (
+            spec.path.clone(),
+            spec.format.clone(),
+            spec.set.clone(),
+            spec.plugins.files.clone(),
+            spec.plugins.allow_writable,
+        );
         let open = py.import("vicepose._vicepose")?.getattr("open_path")?;
         Ok((open, arguments.into_pyobject(py)?.into_any()))
     }

@@ -21,7 +21,7 @@ use crate::document::{Document, loads, write};
 use crate::errors::{Answer, OfPython, missing, usage};
 use crate::recording::Recording;
 use crate::table::{Table, integers, numbers, numbers_or_null, words};
-use crate::work::long;
+use crate::work::{long, short};
 
 /// What an evaluation found, and all that is needed to repeat and to plot it: the document ``vice.result/2``.
 #[pyclass(frozen, name = "Result", module = "vicepose")]
@@ -36,7 +36,12 @@ impl Outcome {
     }
 
     /// The parts that names choose. A name that is both an estimate and the reference means the estimate.
-    fn parts(&self, stream: Option<&str>, depth: Option<&str>, role: Option<&str>) -> Answer<Vec<&PixelPart>> {
+    fn parts(
+        &self,
+        stream: Option<&str>,
+        depth: Option<&str>,
+        role: Option<&str>,
+    ) -> Answer<Vec<&PixelPart>> {
         let role = match role {
             None => None,
             Some("estimate") => Some(Role::Estimate),
@@ -46,14 +51,19 @@ impl Outcome {
         let of = |role: Option<Role>| -> Vec<&PixelPart> {
             let named = |given: Option<&str>, name: &str| given.is_none_or(|g| g == name);
             let parts = self.document.pixel.iter();
-            parts.filter(|p| named(stream, &p.stream) && named(depth, &p.depth) && role.is_none_or(|r| p.role == r)).collect()
+            parts
+                .filter(|p| {
+                    named(stream, &p.stream) && named(depth, &p.depth) && role.is_none_or(|r| p.role == r)
+                })
+                .collect()
         };
         let mut found = of(role);
         if stream.is_some() && role.is_none() && found.iter().any(|p| p.role == Role::Estimate) {
             found = of(Some(Role::Estimate));
         }
         if found.is_empty() {
-            let there: Vec<String> = self.document.pixel.iter().map(|p| format!("{} with {}", p.stream, p.depth)).collect();
+            let there: Vec<String> =
+                self.document.pixel.iter().map(|p| format!("{} with {}", p.stream, p.depth)).collect();
             let asked = format!("{} with {}", stream.unwrap_or("any stream"), depth.unwrap_or("any depth"));
             return Err(missing(format!("the result has no {asked}; it has {}", there.join(", "))));
         }
@@ -86,7 +96,9 @@ impl Outcome {
     /// A result from the text of its document.
     #[classmethod]
     fn from_json(_: &Bound<'_, PyType>, text: &str) -> Answer<Self> {
-        let document = serde_json::from_str(text).map_err(|e| RunError::new(vice_run::core::error::ErrorKind::Corrupt, "is no result document").because(e))?;
+        let document = serde_json::from_str(text).map_err(|e| {
+            RunError::new(vice_run::core::error::ErrorKind::Corrupt, "is no result document").because(e)
+        })?;
         Ok(Self::new(document, None))
     }
 
@@ -140,10 +152,9 @@ impl Outcome {
     /// ``roe_rad`` and ``poses`` are of an estimate against the reference. NaN where a number could not be had.
     fn table(&self) -> Answer<Table> {
         let parts = &self.document.pixel;
-        let trajectory = |p: &PixelPart| {
-            let of_estimate = self.document.trajectory.iter().find(|t| p.role == Role::Estimate && t.estimate == p.stream);
-            of_estimate
-        };
+        let of_estimate = |p: &PixelPart, estimate: &str| p.role == Role::Estimate && estimate == p.stream;
+        let trajectory =
+            |p: &PixelPart| self.document.trajectory.iter().find(|t| of_estimate(p, &t.estimate));
         let number = |f: &dyn Fn(&PixelPart) -> Option<f64>| numbers_or_null(parts.iter().map(f));
         let integer = |n: usize| i64::try_from(n).unwrap_or(i64::MAX);
         Table::new(vec![
@@ -173,8 +184,11 @@ impl Outcome {
     /// the estimate, unless ``role`` is ``reference``.
     #[pyo3(signature = (stream = None, depth = None, role = None))]
     fn samples(&self, stream: Option<&str>, depth: Option<&str>, role: Option<&str>) -> Answer<Table> {
-        let rows: Vec<(&PixelPart, &Sample)> =
-            self.parts(stream, depth, role)?.into_iter().flat_map(|p| p.samples.iter().map(move |s| (p, s))).collect();
+        let rows: Vec<(&PixelPart, &Sample)> = self
+            .parts(stream, depth, role)?
+            .into_iter()
+            .flat_map(|p| p.samples.iter().map(move |s| (p, s)))
+            .collect();
         Table::new(vec![
             ("stream", words(rows.iter().map(|r| r.0.stream.as_str()))),
             ("role", words(rows.iter().map(|r| role_name(r.0.role)))),
@@ -230,8 +244,8 @@ impl Outcome {
     ///
     /// The table as ``vice evaluate --csv`` writes it; without a path its text is returned.
     #[pyo3(signature = (path = None))]
-    fn to_csv(&self, path: Option<PathBuf>) -> Answer<Option<String>> {
-        given_or_written(csv::render(&self.document)?, path)
+    fn to_csv(&self, py: Python<'_>, path: Option<PathBuf>) -> Answer<Option<String>> {
+        given_or_written(short(py, || csv::render(&self.document))?, path)
     }
 
     /// to_latex(path=None)
@@ -239,8 +253,8 @@ impl Outcome {
     ///
     /// The table as ``vice evaluate --latex`` writes it; without a path its text is returned.
     #[pyo3(signature = (path = None))]
-    fn to_latex(&self, path: Option<PathBuf>) -> Answer<Option<String>> {
-        given_or_written(latex::render(&self.document)?, path)
+    fn to_latex(&self, py: Python<'_>, path: Option<PathBuf>) -> Answer<Option<String>> {
+        given_or_written(short(py, || latex::render(&self.document))?, path)
     }
 
     /// report(path, run=None, progress=None)
@@ -249,13 +263,21 @@ impl Outcome {
     /// Writes the page with the table, plots and images, with the bytes of ``vice evaluate --report``. The images are
     /// read from the run that was evaluated; of a result that was read from a file, from ``run`` or from where it says.
     #[pyo3(signature = (path, run = None, progress = None))]
-    fn report(&self, py: Python<'_>, path: PathBuf, run: Option<&Recording>, progress: Option<Py<PyAny>>) -> Answer<()> {
+    fn report(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        run: Option<&Recording>,
+        progress: Option<Py<PyAny>>,
+    ) -> Answer<()> {
         let document = Arc::clone(&self.document);
         let given = run.map(|run| Arc::clone(&run.dataset)).or_else(|| self.dataset.clone());
         let page = long(py, progress.as_ref(), move |progress| {
             let opened = given.map_or_else(|| document.request.dataset.open().map(|o| o.dataset), Ok);
             let shots = match opened {
-                Ok(dataset) => Shots::of(&document, dataset.as_ref(), IMAGE_BUDGET_BYTES, &|done, total| progress("reading images", done, total)),
+                Ok(dataset) => Shots::of(&document, dataset.as_ref(), IMAGE_BUDGET_BYTES, &|done, total| {
+                    progress("reading images", done, total)
+                }),
                 Err(error) => Shots::missing(error.to_string()),
             };
             render(&[Run::new(document.as_ref().clone(), shots)])
@@ -269,12 +291,12 @@ impl Outcome {
         slf.py().import("vicepose.plot")?.call_method1("Plots", (slf,))
     }
 
-    fn __str__(&self) -> String {
-        table::render(&self.document)
+    fn __str__(&self, py: Python<'_>) -> Answer<String> {
+        short(py, || Ok(table::render(&self.document)))
     }
 
-    fn __repr__(&self) -> String {
-        table::render(&self.document).trim_end().to_string()
+    fn __repr__(&self, py: Python<'_>) -> Answer<String> {
+        Ok(self.__str__(py)?.trim_end().to_string())
     }
 
     fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
@@ -297,7 +319,12 @@ fn given_or_written(text: String, path: Option<PathBuf>) -> Answer<Option<String
 /// Holds results side by side, label by label.
 #[pyfunction]
 #[pyo3(signature = (results, by = None, seed = 1))]
-pub(crate) fn compare(py: Python<'_>, results: Vec<(String, PyRef<'_, Outcome>)>, by: Option<&str>, seed: u64) -> Answer<Document> {
+pub(crate) fn compare(
+    py: Python<'_>,
+    results: Vec<(String, PyRef<'_, Outcome>)>,
+    by: Option<&str>,
+    seed: u64,
+) -> Answer<Document> {
     let runs: Vec<_> = results.iter().map(|(name, r)| (name.clone(), r.document.as_ref().clone())).collect();
     let by = match by {
         Some(by) => by.parse::<By>().map_err(|e| usage("by", e))?,
@@ -307,7 +334,10 @@ pub(crate) fn compare(py: Python<'_>, results: Vec<(String, PyRef<'_, Outcome>)>
         let warnings = std::cell::RefCell::new(Vec::new());
         let document = comparison::Document::of(&runs, by, seed, &|text| warnings.borrow_mut().push(text));
         if document.comparisons.is_empty() {
-            return Err(RunError::usage("results", "there is nothing to compare: they share no scored label of a stream and depth source"));
+            return Err(RunError::usage(
+                "results",
+                "there is nothing to compare: they share no scored label of a stream and depth source",
+            ));
         }
         let json = serde_json::to_string(&document)? + "\n";
         Ok(Document::new(json, comparison::text(&document))

@@ -36,7 +36,10 @@ impl Robot {
     pub(crate) fn new(object: &Bound<'_, PyAny>) -> Answer<Self> {
         let class = object.get_type().name().map_or_else(|_| "robot".to_string(), |n| n.to_string());
         if let Some(lacks) = NEEDED.iter().find(|name| !has(object, name)) {
-            return Err(usage("run", format!("an object of {class} is no recording: it has no method `{lacks}`")));
+            return Err(usage(
+                "run",
+                format!("an object of {class} is no recording: it has no method `{lacks}`"),
+            ));
         }
         let text = |attribute: &str| -> Answer<Option<String>> {
             match object.getattr_opt(attribute).python()? {
@@ -100,7 +103,10 @@ impl Robot {
     fn check_index(&self, camera: &str, index: usize) -> DataResult<Stamp> {
         let frames = self.frames(camera)?;
         frames.get(index).copied().ok_or_else(|| {
-            DataError::of_kind(ErrorKind::Missing, format!("camera {camera} has {} frames and none of index {index}", frames.len()))
+            DataError::of_kind(
+                ErrorKind::Missing,
+                format!("camera {camera} has {} frames and none of index {index}", frames.len()),
+            )
         })
     }
 }
@@ -145,22 +151,34 @@ impl Dataset for Robot {
 
     fn camera(&self, camera: &str) -> DataResult<CoreCamera> {
         self.check_camera(camera)?;
-        self.ask("camera", |py| (camera,).into_pyobject(py), |value| {
-            let camera = value.cast::<Camera>().map_err(|_| wrong("camera", "a vicepose.Camera is expected"))?;
-            Ok(camera.get().core)
-        })
+        self.ask(
+            "camera",
+            |py| (camera,).into_pyobject(py),
+            |value| {
+                let camera =
+                    value.cast::<Camera>().map_err(|_| wrong("camera", "a vicepose.Camera is expected"))?;
+                Ok(camera.get().core)
+            },
+        )
     }
 
     fn frames(&self, camera: &str) -> DataResult<Arc<[Stamp]>> {
         self.check_camera(camera)?;
-        self.ask("frames", |py| (camera,).into_pyobject(py), |value| {
-            let ns = stamps(value, "frames")?;
-            let ns = ns.as_slice().python()?;
-            if let Some(place) = ns.windows(2).position(|w| w[0] >= w[1]) {
-                return Err(wrong("frames", &format!("frame {} is not later than the one before", place + 1)));
-            }
-            Ok(ns.iter().map(|ns| Stamp::from_nanos(*ns)).collect())
-        })
+        self.ask(
+            "frames",
+            |py| (camera,).into_pyobject(py),
+            |value| {
+                let ns = stamps(value, "frames")?;
+                let ns = ns.as_slice().python()?;
+                if let Some(place) = ns.windows(2).position(|w| w[0] >= w[1]) {
+                    return Err(wrong(
+                        "frames",
+                        &format!("frame {} is not later than the one before", place + 1),
+                    ));
+                }
+                Ok(ns.iter().map(|ns| Stamp::from_nanos(*ns)).collect())
+            },
+        )
     }
 
     fn image(&self, camera: &str, index: usize) -> DataResult<Image> {
@@ -171,9 +189,14 @@ impl Dataset for Robot {
 
     fn body_from_camera(&self, camera: &str, stamp: Stamp) -> DataResult<BodyFromCamera> {
         self.check_camera(camera)?;
-        self.ask("body_from_camera", |py| (camera, stamp.as_nanos()).into_pyobject(py), |value| {
-            Rigid::try_from_row_major(&matrix(value, "body_from_camera")?).map_err(|e| wrong("body_from_camera", &e.to_string()))
-        })
+        self.ask(
+            "body_from_camera",
+            |py| (camera, stamp.as_nanos()).into_pyobject(py),
+            |value| {
+                Rigid::try_from_row_major(&matrix(value, "body_from_camera")?)
+                    .map_err(|e| wrong("body_from_camera", &e.to_string()))
+            },
+        )
     }
 
     fn streams(&self) -> Vec<String> {
@@ -183,26 +206,38 @@ impl Dataset for Robot {
     }
 
     fn trajectory(&self, stream: &str) -> DataResult<CoreTrajectory> {
-        let known = self.ask_if_there("streams", none, |v| v.extract::<Vec<String>>().python())?.unwrap_or_default();
+        let known =
+            self.ask_if_there("streams", none, |v| v.extract::<Vec<String>>().python())?.unwrap_or_default();
         if !known.iter().any(|name| name == stream) {
             return Err(DataError::of_kind(ErrorKind::Missing, format!("there is no stream {stream}"))
                 .hint(format!("there are {}", known.join(", "))));
         }
-        self.ask("trajectory", |py| (stream,).into_pyobject(py), |value| {
-            let found = value.cast::<Trajectory>().map_err(|_| wrong("trajectory", "a vicepose.Trajectory is expected"))?;
-            Ok(found.get().core.as_ref().clone())
-        })
+        self.ask(
+            "trajectory",
+            |py| (stream,).into_pyobject(py),
+            |value| {
+                let found = value
+                    .cast::<Trajectory>()
+                    .map_err(|_| wrong("trajectory", "a vicepose.Trajectory is expected"))?;
+                Ok(found.get().core.as_ref().clone())
+            },
+        )
     }
 
     fn is_relative(&self, stream: &str) -> bool {
         let read = |value: &Bound<'_, PyAny>| value.is_truthy().python();
-        self.ask_if_there("is_relative", |py| (stream,).into_pyobject(py), read).ok().flatten().unwrap_or(false)
+        self.ask_if_there("is_relative", |py| (stream,).into_pyobject(py), read)
+            .ok()
+            .flatten()
+            .unwrap_or(false)
     }
 
     fn imu(&self) -> DataResult<Arc<[ImuSample]>> {
         let samples = self.ask_if_there("imu", none, |value| {
-            let (ns, gyro, accel): (Bound<'_, PyAny>, Bound<'_, PyAny>, Bound<'_, PyAny>) = value.extract().python()?;
-            let (ns, gyro, accel) = (stamps(&ns, "imu")?, Rows::of::<3>(&gyro, "imu")?, Rows::of::<3>(&accel, "imu")?);
+            let (ns, gyro, accel): (Bound<'_, PyAny>, Bound<'_, PyAny>, Bound<'_, PyAny>) =
+                value.extract().python()?;
+            let (ns, gyro, accel) =
+                (stamps(&ns, "imu")?, Rows::of::<3>(&gyro, "imu")?, Rows::of::<3>(&accel, "imu")?);
             let (ns, gyro, accel) = (ns.as_slice().python()?, gyro.rows::<3>()?, accel.rows::<3>()?);
             if gyro.len() != ns.len() || accel.len() != ns.len() {
                 return Err(wrong("imu", "stamps, rates and forces differ in length"));
@@ -219,14 +254,20 @@ impl Dataset for Robot {
 
     fn depth_image(&self, camera: &str, index: usize) -> DataResult<Option<DepthImage>> {
         let stamp = self.check_index(camera, index)?;
-        self.ask_if_there("depth_image", |py| (camera, index).into_pyobject(py), |value| {
-            let shape: Vec<usize> = value.getattr("shape").and_then(|s| s.extract()).python()?;
-            let &[rows, columns] = shape.as_slice() else { return Err(wrong("depth_image", "an array of shape (rows, columns) is expected")) };
-            let flat = value.call_method1("reshape", (-1,)).python()?;
-            let z_m = column::<f32>(&flat, "float32", "depth_image")?.as_slice().python()?.to_vec();
-            let (width, height) = size(columns, rows)?;
-            Ok(DepthImage::new(stamp, width, height, z_m)?)
-        })
+        self.ask_if_there(
+            "depth_image",
+            |py| (camera, index).into_pyobject(py),
+            |value| {
+                let shape: Vec<usize> = value.getattr("shape").and_then(|s| s.extract()).python()?;
+                let &[rows, columns] = shape.as_slice() else {
+                    return Err(wrong("depth_image", "an array of shape (rows, columns) is expected"));
+                };
+                let flat = value.call_method1("reshape", (-1,)).python()?;
+                let z_m = column::<f32>(&flat, "float32", "depth_image")?.as_slice().python()?.to_vec();
+                let (width, height) = size(columns, rows)?;
+                Ok(DepthImage::new(stamp, width, height, z_m)?)
+            },
+        )
     }
 
     fn has_depth(&self, camera: &str) -> bool {
@@ -238,7 +279,8 @@ impl Dataset for Robot {
     fn cloud(&self) -> DataResult<Option<CloudRef>> {
         self.ask_if_there("cloud", none, |value| {
             let (points, place): (Bound<'_, PyAny>, Bound<'_, PyAny>) = value.extract().python()?;
-            let world_from_cloud = Rigid::try_from_row_major(&matrix(&place, "cloud")?).map_err(|e| wrong("cloud", &e.to_string()))?;
+            let world_from_cloud = Rigid::try_from_row_major(&matrix(&place, "cloud")?)
+                .map_err(|e| wrong("cloud", &e.to_string()))?;
             let source = match points.extract::<std::path::PathBuf>() {
                 Ok(path) => CloudSource::Ply(path),
                 Err(_) => {
@@ -252,10 +294,14 @@ impl Dataset for Robot {
     }
 
     fn floor(&self, keyframe: Stamp) -> DataResult<Floor> {
-        let found = self.ask_if_there("floor", |py| (keyframe.as_nanos(),).into_pyobject(py), |value| {
-            let [nx, ny, nz, d]: [f64; 4] = value.extract().python()?;
-            Ok(Floor::World(Plane::new([nx, ny, nz], d).map_err(|e| wrong("floor", &e.to_string()))?))
-        })?;
+        let found = self.ask_if_there(
+            "floor",
+            |py| (keyframe.as_nanos(),).into_pyobject(py),
+            |value| {
+                let [nx, ny, nz, d]: [f64; 4] = value.extract().python()?;
+                Ok(Floor::World(Plane::new([nx, ny, nz], d).map_err(|e| wrong("floor", &e.to_string()))?))
+            },
+        )?;
         Ok(found.unwrap_or_else(|| Floor::World(Plane::z_zero())))
     }
 }
@@ -267,11 +313,22 @@ fn size(columns: usize, rows: usize) -> Answer<(u32, u32)> {
 
 fn image_of(value: &Bound<'_, PyAny>) -> Answer<Image> {
     let shape: Vec<usize> = value.getattr("shape").and_then(|s| s.extract()).python()?;
-    let dtype = value.getattr("dtype").and_then(|d| d.getattr("name")).and_then(|n| n.extract::<String>()).python()?;
+    let dtype = value
+        .getattr("dtype")
+        .and_then(|d| d.getattr("name"))
+        .and_then(|n| n.extract::<String>())
+        .python()?;
     let (rows, columns, format) = match shape.as_slice() {
         &[rows, columns] | &[rows, columns, 1] => (rows, columns, PixelFormat::Gray8),
         &[rows, columns, 3] => (rows, columns, PixelFormat::Rgb8),
-        other => return Err(wrong("image", &format!("an array of shape (rows, columns) or (rows, columns, 3) is expected, not {other:?}"))),
+        other => {
+            return Err(wrong(
+                "image",
+                &format!(
+                    "an array of shape (rows, columns) or (rows, columns, 3) is expected, not {other:?}"
+                ),
+            ));
+        }
     };
     if dtype != "uint8" {
         return Err(wrong("image", &format!("uint8 is expected, not {dtype}")));

@@ -5,7 +5,10 @@ use std::sync::Arc;
 use arrow_array::ffi::FFI_ArrowSchema;
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::types::Int32Type;
-use arrow_array::{Array, ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int64Array, RecordBatch, RecordBatchIterator, StringArray};
+use arrow_array::{
+    Array, ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int64Array, RecordBatch,
+    RecordBatchIterator, StringArray,
+};
 use arrow_schema::{ArrowError, Field, Schema};
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict, PyList};
@@ -153,7 +156,11 @@ fn values<'py>(py: Python<'py>, array: &ArrayRef) -> Answer<Bound<'py, PyAny>> {
         && let Some(texts) = words.values().as_any().downcast_ref::<StringArray>()
     {
         // Each word is made once and shared by its rows.
-        let made: Vec<_> = texts.iter().map(|t| t.unwrap_or_default().into_pyobject(py)).collect::<Result<_, _>>().unwrap_or_default();
+        let made: Vec<_> = texts
+            .iter()
+            .map(|t| t.unwrap_or_default().into_pyobject(py))
+            .collect::<Result<_, _>>()
+            .unwrap_or_default();
         let list = words.keys().iter().map(|k| made.get(k.unwrap_or_default() as usize));
         return Ok(PyList::new(py, list).map_err(Failure::Python)?.into_any());
     }

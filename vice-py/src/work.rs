@@ -15,6 +15,7 @@ use vice_run::Progress;
 use vice_run::error::RunResult;
 
 use crate::errors::{Answer, Failure, OfPython};
+use crate::warnings;
 
 /// How often signals are looked for and progress is shown.
 const LOOK: Duration = Duration::from_millis(50);
@@ -68,14 +69,16 @@ pub(crate) fn stoppable<T: Send + 'static>(
     progress: Option<&Py<PyAny>>,
     work: impl FnOnce(&Told) -> RunResult<T> + Send + 'static,
 ) -> Answer<T> {
+    warnings::listen();
     let told = Arc::new(Told::default());
     let (send, receive) = channel();
     let its = Arc::clone(&told);
-    let spawned = std::thread::Builder::new().name("vicepose".to_string()).stack_size(STACK_BYTES).spawn(move || {
-        let outcome = catch_unwind(AssertUnwindSafe(|| work(&its)));
-        // Who waited may be gone.
-        let _ = send.send(outcome);
-    });
+    let spawned =
+        std::thread::Builder::new().name("vicepose".to_string()).stack_size(STACK_BYTES).spawn(move || {
+            let outcome = catch_unwind(AssertUnwindSafe(|| work(&its)));
+            // Who waited may be gone.
+            let _ = send.send(outcome);
+        });
     spawned?;
     wait(py, receive, &told, progress)
 }
@@ -108,7 +111,9 @@ fn wait<T: Send>(
                 show().python()?;
                 return outcome_of(outcome);
             }
-            Err(RecvTimeoutError::Disconnected) => return Err(Failure::Panicked("the work ended without an answer".to_string())),
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(Failure::Panicked("the work ended without an answer".to_string()));
+            }
             Err(RecvTimeoutError::Timeout) => {
                 if let Err(error) = py.check_signals().and_then(|()| show()) {
                     told.stop.store(true, Ordering::SeqCst);
@@ -131,7 +136,14 @@ fn outcome_of<T>(outcome: Outcome<T>) -> Answer<T> {
 
 /// Short work on the caller's thread, where a panic would be one as well.
 pub(crate) fn guarded<T>(work: impl FnOnce() -> Answer<T>) -> Answer<T> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| Err(Failure::Panicked(text_of(payload.as_ref()))))
+    catch_unwind(AssertUnwindSafe(work))
+        .unwrap_or_else(|payload| Err(Failure::Panicked(text_of(payload.as_ref()))))
+}
+
+/// Short work that reads data, without the interpreter's lock: other threads may need it to go on.
+pub(crate) fn short<T: Send>(py: Python<'_>, work: impl FnOnce() -> RunResult<T> + Send) -> Answer<T> {
+    warnings::listen();
+    py.detach(|| guarded(|| Ok(work()?)))
 }
 
 /// The last panic's text and place, kept in place of being printed.
@@ -151,6 +163,7 @@ fn text_of(payload: &(dyn Any + Send)) -> String {
     let kept = LAST.lock().unwrap_or_else(PoisonError::into_inner).take();
     kept.unwrap_or_else(|| {
         let text = payload.downcast_ref::<&str>().map(|s| (*s).to_string());
-        text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_else(|| "it panicked".to_string())
+        text.or_else(|| payload.downcast_ref::<String>().cloned())
+            .unwrap_or_else(|| "it panicked".to_string())
     })
 }

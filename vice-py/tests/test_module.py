@@ -214,3 +214,28 @@ def use(path: str) -> float:
     vice.log_rerun(result, run)
     return rmse + batch.total + len(sentence) + float(pixels[0, 0]) + len(result.samples("mine", "floor"))
 '''
+
+
+def test_warnings_go_to_logging(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    late = tmp_path / "labels.csv"
+    late.write_text("point,timestamp_ns,u_px,v_px,keyframe,sourcery\na,1,1,1,1,x\na,2,1,1,0,x\n")
+    vice.Labels.read(late)
+    assert any(record.name == "vicepose" and "sourcery" in record.getMessage() for record in caplog.records)
+
+
+def test_a_format_that_is_none_is_left_out_with_a_warning(flight: Path, caplog: pytest.LogCaptureFixture) -> None:
+    class Odd:
+        offers = 7
+
+        @classmethod
+        def probe(cls, path: Path) -> bool:
+            return False
+
+    from vicepose import _formats
+
+    vice.register_format(Odd)
+    try:
+        assert vice.open(flight).format == "euroc"
+    finally:
+        _formats._registered.remove(Odd)
+    assert any("is left out" in record.getMessage() for record in caplog.records)

@@ -90,8 +90,8 @@ mod tests {
     fn points(n: usize) -> Vec<[f64; 3]> {
         let point = |i: usize| {
             let t = i as f64;
-            let z = if i % 11 == 0 { -1.0 } else { 0.5 + (t * 0.37).fract() * 6.0 };
-            let x = if i % 97 == 0 { f64::NAN } else { (t * 0.61).fract() * 8.0 - 4.0 };
+            let z = if i.is_multiple_of(11) { -1.0 } else { 0.5 + (t * 0.37).fract() * 6.0 };
+            let x = if i.is_multiple_of(97) { f64::NAN } else { (t * 0.61).fract() * 8.0 - 4.0 };
             [x, (t * 0.83).fract() * 6.0 - 3.0, z]
         };
         (0..n).map(point).collect()
