@@ -2,7 +2,6 @@
 
 use std::fmt;
 use std::io::{IsTerminal, Write};
-use std::process::ExitCode;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use tracing_subscriber::fmt::format::Writer;
@@ -146,7 +145,7 @@ where
 }
 
 /// Help and version as they are; what is wrong with the command line on one line, as every other error.
-pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
+pub(crate) fn wrong_usage(error: &clap::Error) -> u8 {
     use clap::error::ErrorKind;
     if matches!(
         error.kind(),
@@ -156,7 +155,7 @@ pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
     ) {
         // Nothing is left to tell if even this cannot be printed.
         let _ = error.print();
-        return ExitCode::from(u8::from(error.use_stderr()) * 2);
+        return u8::from(error.use_stderr()) * 2;
     }
     let text = error.to_string();
     // The usage and the pointer to help come after what is wrong and its tips.
@@ -164,7 +163,7 @@ pub(crate) fn wrong_usage(error: &clap::Error) -> ExitCode {
     let what = what.split("\n\nFor more information").next().unwrap_or(what);
     let words: Vec<&str> = what.split_whitespace().collect();
     let _ = writeln!(std::io::stderr(), "{} (see --help)", printable(&words.join(" ")));
-    ExitCode::from(2)
+    2
 }
 
 /// Prints an error and its causes on one line.

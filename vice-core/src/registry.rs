@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::dataset::{Dataset, DatasetFactory, FormatInfo, OpenOptions, Probe};
-use crate::error::{DataError, DataResult};
+use crate::error::{DataError, DataResult, ErrorKind};
 
 /// The formats that are known. A plain value: there is no global state.
 #[derive(Default)]
@@ -46,7 +46,7 @@ impl Registry {
     /// [`DataError`] if the path does not exist, or no format or more than one claims it.
     pub fn detect(&self, path: &Path) -> DataResult<(&dyn DatasetFactory, Probe)> {
         if !path.exists() {
-            return Err(DataError::new("no such file or folder").at(path));
+            return Err(DataError::of_kind(ErrorKind::Missing, "no such file or folder").at(path));
         }
         let mut claims: Vec<(&dyn DatasetFactory, Probe)> = self
             .factories
@@ -86,7 +86,7 @@ impl Registry {
         let factory = match format {
             Some(name) => {
                 if !path.exists() {
-                    return Err(DataError::new("no such file or folder").at(path));
+                    return Err(DataError::of_kind(ErrorKind::Missing, "no such file or folder").at(path));
                 }
                 self.by_name(name)?
             }

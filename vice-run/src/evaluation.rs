@@ -44,18 +44,24 @@ impl LabelsSpec {
         if self.file.as_os_str().is_empty() {
             return Err(RunError::usage("labels", "no file of labels is named"));
         }
-        let file = vice_files::labels::read_file(&self.file, Some(&opened.frames))?;
-        file.check_image_size(opened.camera.width(), opened.camera.height()).map_err(|e| e.at(&self.file))?;
-        let labels = file.labels;
+        let (labels, suspicions) = match opened.in_memory.labels(&self.file)? {
+            Some(labels) => (labels.clone(), Suspicions::new()),
+            None => {
+                let file = vice_files::labels::read_file(&self.file, Some(&opened.frames))?;
+                file.check_image_size(opened.camera.width(), opened.camera.height())
+                    .map_err(|e| e.at(&self.file))?;
+                (file.labels, file.suspicions)
+            }
+        };
         tracing::info!("{} points with {} labels", labels.points().len(), labels.observation_count());
         if self.points.is_empty() {
-            return Ok((labels, file.suspicions));
+            return Ok((labels, suspicions));
         }
         let chosen = labels.select(&self.points).map_err(|unknown| {
             let names: Vec<&str> = labels.points().iter().map(|p| p.name.as_str()).collect();
             RunError::usage("points", format!("there is no point {unknown}; there are {}", names.join(", ")))
         })?;
-        Ok((chosen, file.suspicions))
+        Ok((chosen, suspicions))
     }
 }
 

@@ -1,5 +1,8 @@
 //! The formats that are known: those built in, and those of plugins.
 
+use std::sync::OnceLock;
+
+use vice_core::dataset::DatasetFactory;
 use vice_core::error::one_line;
 use vice_core::registry::Registry;
 use vice_host::{LoadOptions, Plugin, search};
@@ -23,6 +26,17 @@ pub struct Formats {
     pub plugins: Vec<LoadedPlugin>,
     /// Why libraries that nobody named were not loaded, one line each.
     pub left_out: Vec<String>,
+}
+
+/// Makes the formats of the program that VICE is a part of, whenever formats are loaded.
+type OfHost = Box<dyn Fn() -> Vec<Box<dyn DatasetFactory>> + Send + Sync>;
+
+static OF_HOST: OnceLock<OfHost> = OnceLock::new();
+
+/// Names the formats of the program that VICE is a part of, such as those written in Python. They stand behind what is
+/// built in and take no other's place. Said once, before anything is opened; false if it was said before.
+pub fn of_host(formats: impl Fn() -> Vec<Box<dyn DatasetFactory>> + Send + Sync + 'static) -> bool {
+    OF_HOST.set(Box::new(formats)).is_ok()
 }
 
 /// The formats that are built in.
@@ -66,7 +80,20 @@ impl Formats {
                 Err(error) => formats.left_out.push(format!("plugin {}", one_line(&error))),
             }
         }
+        formats.add_those_of_host();
         Ok(formats)
+    }
+
+    fn add_those_of_host(&mut self) {
+        for factory in OF_HOST.get().map(|formats| formats()).unwrap_or_default() {
+            let name = factory.info().name;
+            if self.registry.by_name(&name).is_ok() {
+                self.left_out
+                    .push(format!("the host's format `{name}` is left out: there is one of that name"));
+            } else {
+                self.registry.add(factory);
+            }
+        }
     }
 
     /// One that the user named goes before what is built in, but two of them must not compete.

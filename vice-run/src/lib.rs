@@ -33,6 +33,7 @@ pub mod film;
 pub mod floor;
 pub mod formats;
 mod imu_start;
+pub mod in_memory;
 pub mod info;
 pub mod open;
 pub mod plugin;

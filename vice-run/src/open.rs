@@ -14,6 +14,7 @@ use vice_files::calibration::CalibrationFile;
 
 use crate::error::{RunError, RunResult};
 use crate::formats;
+use crate::in_memory::InMemory;
 use crate::request::{DatasetSpec, Protocol};
 use crate::scans::Scans;
 
@@ -32,6 +33,8 @@ pub struct Opened {
     pub calibration: Option<CalibrationFile>,
     /// Scans that other runs may have read already, where several runs are made.
     pub scans: Option<Arc<Scans>>,
+    /// Poses and labels that a request may name though no file holds them.
+    pub in_memory: InMemory,
 }
 
 impl DatasetSpec {
@@ -96,6 +99,7 @@ impl DatasetSpec {
             dataset.format(),
             frames.len()
         );
+        let in_memory = InMemory::default();
         Ok(Opened {
             dataset: Arc::new(calibrated),
             camera_name: name,
@@ -103,6 +107,7 @@ impl DatasetSpec {
             frames,
             calibration,
             scans: None,
+            in_memory,
         })
     }
 

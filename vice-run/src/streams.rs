@@ -23,6 +23,7 @@ use vice_files::trajectory::{ReadOptions, TrajectoryFormat};
 
 use crate::error::{RunError, RunResult};
 use crate::imu_start::ImuStart;
+use crate::in_memory::own_name;
 use crate::open::Opened;
 use crate::request::{Anchor, EstimateFrame, EstimateSpec, IMU_EULER, ReferenceSpec, StreamsSpec};
 
@@ -68,7 +69,7 @@ impl StreamsSpec {
         loader.reference = loader.load_reference()?;
         let mut list: Vec<Stream> = loader.reference.iter().cloned().collect();
         let mut inertial = None;
-        for spec in &self.estimates {
+        for (place, spec) in self.estimates.iter().enumerate() {
             let integrates = *spec == EstimateSpec::ImuEuler && !loader.is_stream(IMU_EULER);
             let trajectory = if integrates {
                 let run = loader.imu_euler()?;
@@ -80,7 +81,7 @@ impl StreamsSpec {
             } else {
                 loader.estimate(spec)?
             };
-            let name = stream_name(spec, &list);
+            let name = self.names.get(place).cloned().unwrap_or_else(|| stream_name(spec, &list));
             // What starts in the reference's own state is in its world: moving it there would hide its drift.
             let align = integrates.then_some(Alignment::FirstPose);
             let stream = Stream { name, role: Role::Estimate, trajectory, time_offset, align };
@@ -137,7 +138,7 @@ fn own_world(opened: &Opened, spec: &EstimateSpec) -> RunResult<Suspicion> {
     }
     Ok(Suspicion::new(
         "own-world",
-        spec.to_string(),
+        own_name(&spec.to_string()),
         "it places the camera for depth by itself: the floor or cloud must be in its world",
     )
     .advice("else give `initial-pose`"))
@@ -188,6 +189,9 @@ impl Loader<'_> {
         let name = spec.to_string();
         if self.is_stream(&name) {
             return Ok(self.dataset().trajectory(&name)?);
+        }
+        if let Some(trajectory) = self.opened.in_memory.trajectory(&name)? {
+            return Ok(trajectory.clone());
         }
         if !spec.path().is_some_and(Path::exists) {
             let streams = self.dataset().streams();
@@ -342,19 +346,24 @@ impl Loader<'_> {
     }
 }
 
-/// A file's stem, or the stream's own name; told apart by a number where two are alike.
-fn stream_name(spec: &EstimateSpec, taken: &[Stream]) -> String {
-    let word = spec.word();
+/// What a stream is called where nothing else is said: a file's stem, or the stream's own name.
+pub fn plain_name(spec: &EstimateSpec) -> String {
+    let word = own_name(&spec.word()).to_string();
     let path = Path::new(&word);
-    let stem = match path.extension() {
-        Some(_) if path.exists() => path.file_stem().and_then(|s| s.to_str()).unwrap_or(&word),
-        _ => &word,
-    };
+    match path.extension() {
+        Some(_) if path.exists() => path.file_stem().and_then(|s| s.to_str()).unwrap_or(&word).to_string(),
+        _ => word,
+    }
+}
+
+/// The same, told apart by a number where two are alike.
+fn stream_name(spec: &EstimateSpec, taken: &[Stream]) -> String {
+    let stem = plain_name(spec);
     let is_taken = |name: &str| taken.iter().any(|s| s.role == Role::Estimate && s.name == name);
     (1_usize..)
-        .map(|n| if n == 1 { stem.to_string() } else { format!("{stem}-{n}") })
+        .map(|n| if n == 1 { stem.clone() } else { format!("{stem}-{n}") })
         .find(|name| !is_taken(name))
-        .unwrap_or_else(|| stem.to_string())
+        .unwrap_or_else(|| stem.clone())
 }
 
 /// A constant rotation between the bodies is never corrected, but said.

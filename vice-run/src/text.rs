@@ -33,6 +33,11 @@ pub fn with_options(hint: &str) -> String {
     text
 }
 
+/// Whether a text in back quotes is the name of a field of a request.
+pub fn is_field(text: &str) -> bool {
+    FIELDS.contains(&text)
+}
+
 /// Fields that have an option of the same name.
 const FIELDS: [&str; 34] = [
     "add",

@@ -16,6 +16,7 @@ use vice_core::trajectory::Trajectory;
 use vice_files::trajectory::{ReadOptions, TrajectoryFormat};
 
 use crate::error::{Context, RunError, RunResult};
+use crate::in_memory::{InMemory, own_name};
 use crate::report::evo_zip::{self, About};
 use crate::report::plots::trajectory as plot;
 use crate::report::table;
@@ -154,11 +155,20 @@ pub struct Compared {
 /// # Errors
 /// [`RunError`] if a file cannot be read, no poses belong together, or they cannot be aligned.
 pub fn compare_trajectories(request: &TrajectoryRequest) -> RunResult<Compared> {
+    compare_in_memory(request, &InMemory::default())
+}
+
+/// The same, where a trajectory may be one that was handed over.
+///
+/// # Errors
+/// As [`compare_trajectories`].
+pub fn compare_in_memory(request: &TrajectoryRequest, memory: &InMemory) -> RunResult<Compared> {
     let delta =
         Delta::new(request.delta, request.delta_unit).map_err(|e| RunError::usage("delta", e.to_string()))?;
     let matching = request.matching()?;
-    let Both { reference, estimate, mut suspicions } = request.read_both()?;
-    let names = (request.reference.to_string(), request.estimate.to_string());
+    let Both { reference, estimate, mut suspicions } = request.read_both(memory)?;
+    let name = |spec: &EstimateSpec| own_name(&spec.to_string()).to_string();
+    let names = (name(&request.reference), name(&request.estimate));
     // As evo: what the reference no longer has is not matched either.
     let pairs = crop(&reference, request.t_start, request.t_end).context(|| names.0.clone()).and_then(|r| {
         PosePairs::match_up(&r, &estimate, matching, request.t_offset)
@@ -205,6 +215,14 @@ pub fn compare_trajectories(request: &TrajectoryRequest) -> RunResult<Compared> 
     Ok(Compared { document, estimate_poses: estimate.len(), pairs, transform })
 }
 
+/// A trajectory as it was read.
+struct One {
+    trajectory: Trajectory,
+    suspicions: Suspicions,
+    /// Rows without a clock, unless a file of times stands beside them.
+    kitti: bool,
+}
+
 /// Both trajectories, and what looked wrong when they were read.
 struct Both {
     reference: Trajectory,
@@ -242,24 +260,20 @@ impl TrajectoryRequest {
     }
 
     /// Two KITTI files without times are compared row by row; one alone has no clock to compare by.
-    fn read_both(&self) -> RunResult<Both> {
-        let read = |spec: &EstimateSpec, index_as_seconds| {
-            spec.read_file(&ReadOptions { times: self.times.clone(), index_as_seconds })
-        };
+    fn read_both(&self, memory: &InMemory) -> RunResult<Both> {
+        let read = |spec: &EstimateSpec, index_as_seconds| self.read(spec, index_as_seconds, memory);
         let (reference, estimate) =
             rayon::join(|| read(&self.reference, true), || read(&self.estimate, true));
         let (mut reference, mut estimate) = (reference?, estimate?);
-        let kitti = |format| format == TrajectoryFormat::Kitti;
-        if self.times.is_some() && !kitti(reference.format) && !kitti(estimate.format) {
+        if self.times.is_some() && !reference.kitti && !estimate.kitti {
             return Err(RunError::usage(
                 "times",
                 "neither file is a KITTI file, so that these times are of nothing",
             ));
         }
-        match (reference.format, estimate.format) {
-            (TrajectoryFormat::Kitti, TrajectoryFormat::Kitti) => {}
-            (TrajectoryFormat::Kitti, _) => reference = read(&self.reference, false)?,
-            (_, TrajectoryFormat::Kitti) => estimate = read(&self.estimate, false)?,
+        match (reference.kitti, estimate.kitti) {
+            (true, false) => reference = read(&self.reference, false)?,
+            (false, true) => estimate = read(&self.estimate, false)?,
             _ => {}
         }
         let mut suspicions = reference.suspicions;
@@ -267,6 +281,15 @@ impl TrajectoryRequest {
         let estimate = cure(&self.estimate_as, &estimate.trajectory, Given::default())
             .map_err(|e| RunError::from(e).of("estimate-as"))?;
         Ok(Both { reference: reference.trajectory, estimate, suspicions })
+    }
+
+    fn read(&self, spec: &EstimateSpec, index_as_seconds: bool, memory: &InMemory) -> RunResult<One> {
+        if let Some(trajectory) = memory.trajectory(&spec.to_string())? {
+            return Ok(One { trajectory: trajectory.clone(), suspicions: Suspicions::new(), kitti: false });
+        }
+        let read = spec.read_file(&ReadOptions { times: self.times.clone(), index_as_seconds })?;
+        let kitti = read.format == TrajectoryFormat::Kitti;
+        Ok(One { trajectory: read.trajectory, suspicions: read.suspicions, kitti })
     }
 }
 

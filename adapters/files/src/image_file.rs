@@ -9,7 +9,7 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::imageops::FilterType as Resampling;
 use image::{DynamicImage, ExtendedColorType, GrayImage, ImageEncoder, ImageReader, Limits, RgbImage};
 use vice_core::dataset::{DepthImage, Image, PixelFormat};
-use vice_core::error::{DataError, DataResult};
+use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::time::Stamp;
 
 /// Columns or rows beyond which a picture is refused.
@@ -184,7 +184,7 @@ fn not_an_image(error: image::ImageError) -> DataError {
 
 fn unreadable(path: &Path, error: io::Error) -> DataError {
     match error.kind() {
-        io::ErrorKind::NotFound => DataError::new("no such file").at(path),
+        io::ErrorKind::NotFound => DataError::of_kind(ErrorKind::Missing, "no such file").at(path),
         _ => DataError::new("cannot be read").at(path).because(error),
     }
 }

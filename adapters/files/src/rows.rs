@@ -56,7 +56,7 @@ pub struct Beginning {
 pub fn open(path: impl AsRef<Path>) -> DataResult<Rows<BufReader<File>>> {
     let path = path.as_ref();
     let failed = |e: std::io::Error| match e.kind() {
-        std::io::ErrorKind::NotFound => DataError::new("no such file").at(path),
+        std::io::ErrorKind::NotFound => DataError::of_kind(ErrorKind::Missing, "no such file").at(path),
         _ => DataError::new("cannot be read").at(path).because(e),
     };
     let file = File::open(path).map_err(failed)?;

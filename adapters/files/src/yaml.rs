@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
-use vice_core::error::{DataError, DataResult};
+use vice_core::error::{DataError, DataResult, ErrorKind};
 
 /// Bytes beyond which a description file is refused.
 const MAX_BYTES: u64 = 4 << 20;
@@ -40,7 +40,7 @@ pub fn parse<T: DeserializeOwned>(text: &str) -> DataResult<T> {
 /// The text of a small file, decoded as UTF-8.
 pub(crate) fn read_text(path: &Path) -> DataResult<String> {
     let failed = |e: std::io::Error| match e.kind() {
-        std::io::ErrorKind::NotFound => DataError::new("no such file").at(path),
+        std::io::ErrorKind::NotFound => DataError::of_kind(ErrorKind::Missing, "no such file").at(path),
         std::io::ErrorKind::InvalidData => DataError::new("is not text").at(path),
         _ => DataError::new("cannot be read").at(path).because(e),
     };

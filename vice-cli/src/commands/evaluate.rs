@@ -1,9 +1,8 @@
 //! `vice evaluate`: the main job.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use vice_run::Samples;
-use vice_run::core::dataset::Dataset;
 use vice_run::core::evaluate::SampleSink;
 use vice_run::core::metrics::align::Alignment;
 use vice_run::report::html::{IMAGE_BUDGET_BYTES, Run, render};
@@ -80,9 +79,6 @@ struct OutputArgs {
     /// A page with the table, plots and images.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// A recording for the Rerun viewer; in builds with the feature rerun.
-    #[arg(long, value_name = "FILE.rrd")]
-    rrd: Option<PathBuf>,
 }
 
 /// What becomes of the scored samples, of which a long run has millions.
@@ -103,21 +99,14 @@ fn percent(text: &str) -> Result<f64, String> {
 pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
     let samples = samples_file(args)?;
     let files = &args.output;
-    if files.rrd.is_some() && !cfg!(feature = "rerun") {
-        return Err(usage("--rrd: this vice was built without Rerun; build it with `--features rerun`"));
-    }
     let subsets = args.scoring.subsets.iter().map(|n| usize::from(*n)).collect();
     let mut request = args.evaluation.request(Scoring { subsets, align: args.scoring.align })?;
     request.depth.compare = args.scoring.depth_check.or(request.depth.compare);
-    let outputs = Outputs::new(
-        &[&files.json, &files.csv, &files.latex, &files.report, &files.rrd, &samples],
-        &request.inputs(),
-    )?;
+    let outputs =
+        Outputs::new(&[&files.json, &files.csv, &files.latex, &files.report, &samples], &request.inputs())?;
     let opened = request.open()?;
-    let dataset = opened.dataset.as_ref();
-    let shown = files.report.is_some() || files.rrd.is_some();
     // The page plots samples even where the document is to list none.
-    let keep = shown || (files.samples == SamplesTo::All && files.json.is_some());
+    let keep = files.report.is_some() || (files.samples == SamplesTo::All && files.json.is_some());
     let mut document = with_progress(verbosity, |progress| match &samples {
         Some(path) => sample_lines::write(path, |sink| {
             request.evaluate(&opened, Samples::Stream(sink as &mut SampleSink<'_>), progress)
@@ -127,14 +116,11 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     })?;
     let page = match &files.report {
         Some(path) => {
-            let shots = shots(&document, dataset, IMAGE_BUDGET_BYTES, verbosity);
+            let shots = shots(&document, opened.dataset.as_ref(), IMAGE_BUDGET_BYTES, verbosity);
             Some((path, render(&[Run::new(document.clone(), shots)])?))
         }
         None => None,
     };
-    if let Some(path) = &files.rrd {
-        record(path, &document, dataset)?;
-    }
     if files.samples == SamplesTo::None {
         document.drop_samples();
     }
@@ -184,24 +170,11 @@ fn samples_file(args: &Args) -> anyhow::Result<Option<PathBuf>> {
     if args.output.samples != SamplesTo::Jsonl {
         return Ok(None);
     }
-    if args.output.report.is_some() || args.output.rrd.is_some() {
-        return Err(usage(
-            "--samples jsonl keeps no samples that --report and --rrd could show; leave it out",
-        ));
+    if args.output.report.is_some() {
+        return Err(usage("--samples jsonl keeps no samples that --report could show; leave it out"));
     }
     match &args.output.json {
         Some(json) if json.as_os_str() != "-" => Ok(Some(json.with_extension("samples.jsonl"))),
         _ => Err(usage("--samples jsonl writes beside the JSON: name a file with --json")),
     }
-}
-
-#[cfg(feature = "rerun")]
-fn record(path: &Path, document: &ResultDocument, dataset: &dyn Dataset) -> anyhow::Result<()> {
-    Ok(report::rerun_log::write(path, document, dataset)?)
-}
-
-/// Refused before the work already.
-#[cfg(not(feature = "rerun"))]
-fn record(_: &Path, _: &ResultDocument, _: &dyn Dataset) -> anyhow::Result<()> {
-    Ok(())
 }

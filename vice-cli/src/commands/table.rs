@@ -2,10 +2,7 @@
 
 use std::path::PathBuf;
 
-use vice_run::batch::Store;
-use vice_run::batch::collect::{Samples, collect};
-use vice_run::batch::fleet_table::{Beside, Format, render};
-use vice_run::batch::results_file;
+use vice_run::batch::fleet_table::{FleetTable, Format};
 
 use crate::terminal::{self, Outcome};
 
@@ -34,24 +31,12 @@ enum How {
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let folder = if args.results.is_dir() { Some(args.results.as_path()) } else { args.results.parent() };
-    // A table that lies in the folder of its batch has the samples beside it.
-    let store = folder.map(Store::new).filter(|s| args.results.is_dir() || s.is_there());
-    let rows = match &store {
-        Some(store) if args.results.is_dir() => collect(store)?.rows,
-        _ => results_file::read(&args.results)?,
-    };
-    let links = folder.map_or_else(String::new, |f| format!("{}/", f.display()));
-    let beside = Beside {
-        samples: store.as_ref().map_or(Samples::None, Samples::Store),
-        links: store.as_ref().filter(|s| s.has_reports()).map(|_| links.as_str()),
-    };
     let format = match args.format {
         How::Text => Format::Text,
         How::Latex => Format::Latex,
         How::Csv => Format::Csv,
         How::Html => Format::Html,
     };
-    terminal::print(&render(&rows, &beside, format)?)?;
+    terminal::print(&FleetTable::open(&args.results)?.render(format)?)?;
     Ok(Outcome::Done)
 }

@@ -54,6 +54,7 @@ impl StreamArgs {
         }
         Ok(StreamsSpec {
             estimates,
+            names: Vec::new(),
             reference: ReferenceSpec::from(self.reference.clone()),
             estimate_frame: self.estimate_frame.clone(),
             estimate_as: self.estimate_as.clone(),

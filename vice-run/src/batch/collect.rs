@@ -88,7 +88,7 @@ pub fn collect(store: &Store) -> RunResult<Collected> {
 
 /// Where samples come from.
 #[derive(Clone, Copy)]
-pub enum Samples<'a> {
+pub(super) enum Samples<'a> {
     /// Nowhere: there is only a table of results.
     None,
     /// The folder of a batch, where they were kept.

@@ -20,7 +20,7 @@ mod multiples;
 mod parquet_rows;
 mod paths;
 pub mod results;
-pub mod results_file;
+mod results_file;
 mod run;
 mod samples;
 pub mod scan;

@@ -118,7 +118,7 @@ pub(super) fn to_csv(rows: &[impl Serialize]) -> RunResult<String> {
 ///
 /// # Errors
 /// [`DataError`] with path and line for what is none, or of another version.
-pub fn read(path: &Path) -> DataResult<Vec<ResultRow>> {
+pub(super) fn read(path: &Path) -> DataResult<Vec<ResultRow>> {
     let rows = if is_parquet(path) { read_parquet(path)? } else { read_csv(path)? };
     match rows.iter().find(|row| row.schema != SCHEMA) {
         Some(row) => {

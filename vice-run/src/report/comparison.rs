@@ -27,6 +27,17 @@ pub enum By {
     Depths,
 }
 
+impl By {
+    /// What is compared where nothing is said: runs, else the streams of the only one, else its depth sources.
+    pub fn usual(runs: &[NamedRun]) -> Self {
+        let [(_, only)] = runs else { return Self::Runs };
+        let first = only.pixel.first();
+        let several =
+            first.is_some_and(|f| only.pixel.iter().any(|p| p.stream != f.stream || p.role != f.role));
+        if several { Self::Streams } else { Self::Depths }
+    }
+}
+
 impl std::str::FromStr for By {
     type Err = String;
 

@@ -18,8 +18,6 @@ pub(crate) mod npy;
 pub(crate) mod numbers;
 pub(crate) mod overlay;
 pub(crate) mod plots;
-#[cfg(feature = "rerun")]
-pub mod rerun_log;
 pub(crate) mod rows;
 pub mod sample_lines;
 pub mod sensitivity_plot;

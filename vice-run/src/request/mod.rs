@@ -26,6 +26,7 @@ pub use estimate::{Anchor, EstimateFrame, EstimateSpec, IMU_EULER, ReferenceSpec
 pub(crate) use word::{seconds, seconds_option};
 
 use crate::error::{RunError, RunResult};
+use crate::in_memory::is_in_memory;
 
 /// Everything that says what is evaluated, and how.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -135,6 +136,9 @@ pub struct StreamsSpec {
     /// What is evaluated.
     #[serde(default)]
     pub estimates: Vec<EstimateSpec>,
+    /// What the result calls them, one for each; empty: the names of files and streams.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub names: Vec<String>,
     /// What it is compared with.
     #[serde(default)]
     pub reference: ReferenceSpec,
@@ -176,6 +180,7 @@ impl Default for StreamsSpec {
     fn default() -> Self {
         Self {
             estimates: Vec::new(),
+            names: Vec::new(),
             reference: ReferenceSpec::default(),
             estimate_frame: EstimateFrame::default(),
             estimate_as: Vec::new(),
@@ -252,6 +257,15 @@ impl Request {
         command_line::of(self)
     }
 
+    /// Whether a command line can ask for it: one names files, and takes their names for the estimates.
+    pub fn has_command_line(&self) -> bool {
+        let estimates = self.streams.estimates.iter().map(ToString::to_string);
+        let reference: Option<String> = self.streams.reference.clone().into();
+        let labels = self.labels.file.display().to_string();
+        let mut all = estimates.chain(reference).chain([labels, self.dataset.path.display().to_string()]);
+        self.streams.names.is_empty() && !all.any(|name| is_in_memory(&name))
+    }
+
     /// The frames and labels that take part.
     pub fn window(&self) -> Window {
         self.protocol.window(self.labels.observations)
@@ -278,6 +292,7 @@ impl Request {
     pub fn check(&self) -> RunResult<()> {
         self.protocol.check()?;
         self.depth.check(&[])?;
+        self.streams.check_names()?;
         if self.streams.max_gap < Span::ZERO {
             return Err(RunError::usage("max-gap", "must not be negative"));
         }
@@ -285,6 +300,22 @@ impl Request {
             return Err(RunError::usage("subsets", format!("{zero} points make no subset")));
         }
         Ok(())
+    }
+}
+
+impl StreamsSpec {
+    /// Names that do not tell the estimates apart are no names.
+    fn check_names(&self) -> RunResult<()> {
+        let (names, estimates) = (&self.names, self.estimates.len());
+        if !names.is_empty() && names.len() != estimates {
+            return Err(RunError::usage("names", format!("{} names for {estimates} estimates", names.len())));
+        }
+        let empty = names.iter().find(|name| name.trim().is_empty());
+        let twice = names.iter().enumerate().find(|(place, name)| names[..*place].contains(name));
+        match empty.or(twice.map(|(_, name)| name)) {
+            Some(name) => Err(RunError::usage("names", format!("`{name}` names no estimate of its own"))),
+            None => Ok(()),
+        }
     }
 }
 

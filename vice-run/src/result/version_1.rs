@@ -108,6 +108,7 @@ fn request(s: &Settings, dataset: &DatasetPart, pixel: &[PixelPart]) -> Request 
         },
         protocol: Protocol { fps: s.fps, start: span(s.start_s), duration: s.duration_s.map(span) },
         streams: StreamsSpec {
+            names: Vec::new(),
             estimates: list("estimate").into_iter().map(EstimateSpec::from).collect(),
             reference: ReferenceSpec::from(other("reference").map(str::to_string)),
             estimate_frame: EstimateFrame::from(s.estimate_frame.clone()),

@@ -209,12 +209,17 @@ impl CalibrationFile {
         self.cameras.get(name)?.body_from_camera
     }
 
+    /// The text of a TOML file.
+    pub fn to_toml(&self) -> String {
+        toml_file::to_text(self)
+    }
+
     /// Writes TOML, all or nothing.
     ///
     /// # Errors
     /// [`DataError`] if the file cannot be written or may not be replaced.
     pub fn write(&self, path: impl AsRef<Path>, overwrite: Overwrite) -> DataResult<()> {
-        let text = toml_file::to_text(self);
+        let text = self.to_toml();
         atomic::write(path, overwrite, |w| w.write_all(text.as_bytes()))
     }
 }

@@ -11,6 +11,7 @@ use vice_run::core::dataset::OpenOptions;
 use vice_run::host::conformance::{Event, Verdict};
 
 use super::child;
+use crate::itself::Itself;
 use crate::terminal::{self, Outcome, printable, usage};
 
 /// Arguments of `vice plugin check`.
@@ -45,7 +46,7 @@ pub(crate) struct Args {
     as_child: bool,
 }
 
-pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub(crate) fn run(args: &Args, itself: &Itself) -> anyhow::Result<Outcome> {
     if args.as_child {
         return child::run(&child::Task {
             file: &args.file,
@@ -59,9 +60,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     if !args.dataset.exists() {
         return Err(usage(format!("{}: no such file or folder", args.dataset.display())));
     }
-    let program = std::env::current_exe().context("this program does not know where it is")?;
-    let mut child = std::process::Command::new(program)
-        .args(std::env::args_os().skip(1))
+    let mut child = itself
+        .again()
         .arg("--as-child")
         .stdin(Stdio::null())
         .stdout(Stdio::piped())

@@ -4,6 +4,7 @@ mod check;
 mod child;
 mod new;
 
+use crate::itself::Itself;
 use crate::terminal::Outcome;
 
 /// What to do with plugins.
@@ -15,9 +16,9 @@ pub(crate) enum Command {
     New(new::Args),
 }
 
-pub(crate) fn run(command: &Command) -> anyhow::Result<Outcome> {
+pub(crate) fn run(command: &Command, itself: &Itself) -> anyhow::Result<Outcome> {
     match command {
-        Command::Check(args) => check::run(args),
+        Command::Check(args) => check::run(args, itself),
         Command::New(args) => new::run(args),
     }
 }

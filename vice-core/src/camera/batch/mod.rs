@@ -7,6 +7,7 @@
 //! Slices hold `f64` or `f32` ([`Element`]).
 
 mod kernels;
+mod rows;
 
 use super::Camera;
 use crate::frames::{self, Motion, Rigid};

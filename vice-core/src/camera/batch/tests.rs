@@ -5,7 +5,7 @@ use crate::camera::{Camera, Model, Pixel};
 use crate::frames::{self, Rigid, World};
 
 /// All models, and lenses that fold back inside the image.
-fn lenses() -> Vec<(&'static str, Camera)> {
+pub(super) fn lenses() -> Vec<(&'static str, Camera)> {
     let lenses: [(&str, [f64; 4], &[f64]); 8] = [
         ("pinhole", [665.1, 665.1, 511.5, 383.5], &[]),
         (

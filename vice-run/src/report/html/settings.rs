@@ -52,10 +52,10 @@ fn text(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_string)
 }
 
-/// The command line that evaluates the same again; `None` where the recording was never a file.
+/// The command line that evaluates the same again; `None` where recording, labels or poses were never files.
 fn command(document: &ResultDocument) -> Option<String> {
     let named = !document.request.dataset.path.as_os_str().is_empty();
-    named.then(|| document.request.command_line())
+    (named && document.request.has_command_line()).then(|| document.request.command_line())
 }
 
 #[cfg(test)]

@@ -1,0 +1,75 @@
+//! `vice`: whether a robot's ego-pose can be trusted, seen with its own camera.
+//!
+//! The program as a function, so that others who carry it (the Python module) start the same one: [`main_from`].
+#![forbid(unsafe_code)]
+
+mod arguments;
+mod commands;
+mod inputs;
+mod itself;
+mod outputs;
+mod signals;
+mod terminal;
+
+use std::ffi::OsString;
+
+use clap::{CommandFactory, Parser};
+
+use arguments::{Cli, Command};
+pub use itself::Itself;
+use terminal::Outcome;
+
+/// Names of the program's commands, in the order of its help.
+pub fn commands() -> Vec<String> {
+    Cli::command().get_subcommands().map(|c| c.get_name().to_string()).collect()
+}
+
+/// Runs the program with the arguments of a command line, the first of which is its own name. Returns the exit code.
+///
+/// `itself` says how the program is started once more, for the commands that need a process of their own. What a command
+/// prints goes to the standard output and error of this process.
+pub fn main_from(args: impl IntoIterator<Item = OsString>, itself: Itself) -> u8 {
+    let args: Vec<OsString> = args.into_iter().collect();
+    let itself = itself.with(args.iter().skip(1).cloned());
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(error) => return terminal::wrong_usage(&error),
+    };
+    let verbosity = terminal::Verbosity::new(cli.quiet, cli.verbose);
+    terminal::show_warnings(verbosity);
+    let outcome = match &cli.command {
+        Command::Annotate(args) => commands::annotate::run(args, verbosity),
+        Command::Demo(args) => commands::demo::run(args, verbosity),
+        Command::Evaluate(args) => commands::evaluate::run(args, verbosity),
+        Command::Diagnose(args) => commands::diagnose::run(args, verbosity),
+        Command::Trajectory(args) => commands::trajectory::run(args),
+        Command::Info(args) => commands::info::run(args),
+        Command::Formats(args) => commands::formats::run(args),
+        Command::Plugin(command) => commands::plugin::run(command, &itself),
+        Command::Depth(args) => commands::depth::run(args, verbosity),
+        Command::Floor(command) => commands::floor::run(command, verbosity),
+        Command::Sensitivity(args) => commands::sensitivity::run(args, verbosity),
+        Command::Synth(args) => commands::synth::run(args, verbosity),
+        Command::Labels(args) => commands::labels::run(args, verbosity),
+        Command::Convert(args) => commands::convert::run(args),
+        Command::Report(args) => commands::report::run(args, verbosity),
+        Command::Overlay(args) => commands::overlay::run(args, verbosity),
+        Command::Compare(args) => commands::compare::run(args),
+        Command::Batch(args) => commands::batch::run(args, verbosity),
+        Command::Table(args) => commands::table::run(args),
+        Command::Bench(args) => commands::bench::run(args, verbosity),
+        Command::Completions(args) => commands::completions::run(args, Cli::command()),
+    };
+    match outcome {
+        Ok(Outcome::Done) => 0,
+        Ok(Outcome::TooManySkips) => 3,
+        Ok(Outcome::RequirementBroken) => 4,
+        Ok(Outcome::RunsFailed) => 1,
+        Ok(Outcome::Interrupted) => signals::INTERRUPTED,
+        Err(error) if terminal::is_broken_pipe(&error) => 0,
+        Err(error) => {
+            terminal::print_error(&error);
+            terminal::exit_code(&error)
+        }
+    }
+}

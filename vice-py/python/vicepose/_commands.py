@@ -1,0 +1,113 @@
+"""Commands of the program that work on files, each in a process of its own.
+
+Arguments by name are the options of the same names: ``at=7`` is ``--at 7``, ``force=True`` is ``--force``, a sequence is a
+list with commas. ``vice COMMAND --help`` describes them. What the command prints is returned.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from ._errors import Error, UsageError
+
+
+def program(*args: str | os.PathLike[str], check: bool = True) -> str:
+    """Runs ``vice`` with the arguments of a command line, and returns what it prints.
+
+    Raises
+    ------
+    UsageError
+        Exit code 2: wrong usage.
+    Error
+        Any other exit code but 0, unless ``check`` is false.
+    """
+    words = [sys.executable, "-m", "vicepose", *(os.fspath(arg) for arg in args)]
+    done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+    if check and done.returncode:
+        lines = [line.removeprefix("error: ") for line in done.stderr.splitlines() if not line.startswith("warning: ")]
+        message = " ".join(lines) or f"vice ended with exit code {done.returncode}"
+        raise (UsageError if done.returncode == 2 else Error)(message)
+    sys.stderr.write(done.stderr)
+    return done.stdout
+
+
+def _words(options: dict[str, Any]) -> list[str]:
+    words = []
+    for name, value in options.items():
+        option = "--" + name.rstrip("_").replace("_", "-")
+        if value is None or value is False:
+            continue
+        if value is True:
+            words.append(option)
+        elif isinstance(value, Sequence) and not isinstance(value, str):
+            words.append(f"{option}={','.join(map(str, value))}")
+        else:
+            words.append(f"{option}={value}")
+    return words
+
+
+def _run(command: Sequence[str], places: Sequence[Any], options: dict[str, Any]) -> str:
+    return program(*command, *map(str, places), *_words(options))
+
+
+def annotate(run: Any, labels: Any, **options: Any) -> str:
+    """Labels key points in the browser, until it is told to end (Ctrl-C)."""
+    return _run(["annotate"], [run], {"labels": labels, **options})
+
+
+def bench(**options: Any) -> str:
+    """How fast points are projected here, beside the machine's limit."""
+    return _run(["bench"], [], options)
+
+
+def convert(run: Any, out: Any, *, to: str, **options: Any) -> str:
+    """Writes a pose stream of a recording as a trajectory file: ``tum``, ``kitti``, ``euroc``."""
+    return _run(["convert"], [run, out], {"to": to, **options})
+
+
+def convert_labels(source: Any, out: Any, **options: Any) -> str:
+    """Converts labels between CSV, JSON and CVAT's XML, or from the authors' pickle."""
+    return _run(["labels", "convert"], [source, out], options)
+
+
+def depth(run: Any, out: Any, *, at: Any, source: Any, **options: Any) -> str:
+    """Depth images of a frame from each source, in a folder."""
+    return _run(["depth"], [run], {"out": out, "at": at, "source": source, **options})
+
+
+def depth_compare(run: Any, labels: Any, *, source: Any, **options: Any) -> str:
+    """Depths of two or more sources at labelled key points, and what a difference costs in pixels."""
+    return _run(["depth", "compare"], [run], {"labels": labels, "source": source, **options})
+
+
+def detect_labels(run: Any, out: Any, **options: Any) -> str:
+    """Labels the corners of AprilTags (``apriltag="36h11"``) or a chessboard (``chessboard="6x7"``) by themselves."""
+    return _run(["labels", "detect"], [run], {"out": out, **options})
+
+
+def fit_floor(run: Any, **options: Any) -> str:
+    """Fits the floor plane to the recording's point cloud, or to a depth image (``at=7``)."""
+    return _run(["floor", "fit"], [run], options)
+
+
+def new_plugin(*places: Any, **options: Any) -> str:
+    """Writes the project of a new plugin in Rust or C++; in Python a class is enough, see :func:`vicepose.open`."""
+    return _run(["plugin", "new"], places, options)
+
+
+def overlay(run: Any, labels: Any, out: Any, **options: Any) -> str:
+    """Draws labels and carried points on the images: a film, or a folder of frames."""
+    return _run(["overlay"], [run], {"labels": labels, "out": out, **options})
+
+
+def scan(folder: Any, base: Any = "") -> str:
+    """A manifest of all data sets below a folder as the text of a CSV, with paths relative to ``base`` where they are below it."""
+    from pathlib import Path
+
+    from . import _vicepose
+
+    return _vicepose.scan(Path(folder).resolve(), Path(base).resolve() if base else Path())
