@@ -4,9 +4,11 @@ use vice_core::depth::DepthSource;
 use vice_core::evaluate::{EvaluateError, Evaluation, SampleSink, Selection, evaluate, evaluate_streaming};
 use vice_core::label::LabelSet;
 use vice_core::suspicion::Suspicions;
+use vice_files::address;
 
 use crate::error::{Context, RunError, RunResult};
 use crate::open::Opened;
+use crate::place::Place;
 use crate::request::{LabelsSpec, Request};
 use crate::result::{OWN_ANCHOR, ResultDocument, Used};
 use crate::streams::LoadedStreams;
@@ -44,8 +46,10 @@ impl LabelsSpec {
         if self.file.as_os_str().is_empty() {
             return Err(RunError::usage("labels", "no file of labels is named"));
         }
-        let file = vice_files::labels::read_file(&self.file, Some(&opened.frames))?;
-        file.check_image_size(opened.camera.width(), opened.camera.height()).map_err(|e| e.at(&self.file))?;
+        let place = Place::of_file(&self.file)?;
+        let file = place.told(vice_files::labels::read_file(place.path(), Some(&opened.frames)))?;
+        let shown = address::shown_path(&self.file);
+        file.check_image_size(opened.camera.width(), opened.camera.height()).map_err(|e| e.at(shown))?;
         let labels = file.labels;
         tracing::info!("{} points with {} labels", labels.points().len(), labels.observation_count());
         if self.points.is_empty() {

@@ -18,6 +18,7 @@
 //! Nothing here prints, and nothing knows a command line.
 #![forbid(unsafe_code)]
 
+mod away;
 pub mod batch;
 pub mod bench;
 pub mod conversion;
@@ -34,6 +35,7 @@ pub mod formats;
 mod imu_start;
 pub mod info;
 pub mod open;
+pub mod place;
 pub mod plugin;
 pub mod report;
 pub mod request;

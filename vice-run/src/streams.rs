@@ -24,6 +24,7 @@ use vice_files::trajectory::{ReadOptions, TrajectoryFormat};
 use crate::error::{RunError, RunResult};
 use crate::imu_start::ImuStart;
 use crate::open::Opened;
+use crate::place::Place;
 use crate::request::{Anchor, EstimateFrame, EstimateSpec, IMU_EULER, ReferenceSpec, StreamsSpec};
 
 /// The streams, the reference first, and which of them is the anchor.
@@ -189,7 +190,7 @@ impl Loader<'_> {
         if self.is_stream(&name) {
             return Ok(self.dataset().trajectory(&name)?);
         }
-        if !spec.path().is_some_and(Path::exists) {
+        if !spec.is_file() {
             let streams = self.dataset().streams();
             let streams = if streams.is_empty() { "none".to_string() } else { streams.join(", ") };
             return Err(RunError::missing(format!(
@@ -237,7 +238,8 @@ impl Loader<'_> {
                 })
             }
             EstimateFrame::File(file) => {
-                let body_from_estimate: Rigid<Body, Sensor> = rigid_file::read(file)?;
+                let place = Place::of_file(file)?;
+                let body_from_estimate: Rigid<Body, Sensor> = place.told(rigid_file::read(place.path()))?;
                 let estimate_from_body = body_from_estimate.inverse();
                 Ok(trajectory.map_poses(|_, pose| pose.reinterpret() * estimate_from_body))
             }
@@ -347,7 +349,7 @@ fn stream_name(spec: &EstimateSpec, taken: &[Stream]) -> String {
     let word = spec.word();
     let path = Path::new(&word);
     let stem = match path.extension() {
-        Some(_) if path.exists() => path.file_stem().and_then(|s| s.to_str()).unwrap_or(&word),
+        Some(_) if spec.is_file() => path.file_stem().and_then(|s| s.to_str()).unwrap_or(&word),
         _ => &word,
     };
     let is_taken = |name: &str| taken.iter().any(|s| s.role == Role::Estimate && s.name == name);

@@ -7,6 +7,7 @@ use std::time::{Duration, SystemTime};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use vice_core::error::{DataError, DataResult, ErrorKind};
+use vice_files::address::shown_path;
 use vice_files::atomic::{self, Overwrite};
 
 use super::content::hex;
@@ -97,7 +98,7 @@ impl Store {
         let rows = manifest.rows.iter().map(|row| ListedRow {
             run_id: row.run_id.clone(),
             group: row.group.clone(),
-            dataset: row.request.dataset.path.display().to_string(),
+            dataset: shown_path(&row.request.dataset.path).display().to_string(),
             asked: asked(&row.request),
         });
         let listed = Listed { schema: BATCH_SCHEMA.to_string(), rows: rows.collect() };

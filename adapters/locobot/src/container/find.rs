@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::suspicion::Suspicion;
+use vice_files::elsewhere;
 
 use super::{db3, mcap, ros1, unpack};
 use crate::names::list;
@@ -27,9 +28,17 @@ pub(super) enum Kind {
 /// The kind of a file, and whether it is compressed as a whole.
 pub(super) fn kind_of(path: &Path) -> DataResult<(Kind, bool)> {
     let mut head = Vec::new();
-    File::open(path)
-        .and_then(|f| f.take(16).read_to_end(&mut head))
-        .map_err(|e| DataError::new("cannot be read").because(e))?;
+    match elsewhere::find(path)? {
+        Some(file) => {
+            head.resize(file.size_bytes().min(16) as usize, 0);
+            file.read_at(0, &mut head)?;
+        }
+        None => {
+            File::open(path)
+                .and_then(|f| f.take(16).read_to_end(&mut head))
+                .map_err(|e| DataError::new("cannot be read").because(e))?;
+        }
+    }
     if let Some(kind) = kind_of_head(&head) {
         return Ok((kind, false));
     }
