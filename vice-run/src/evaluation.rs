@@ -123,7 +123,9 @@ impl Request {
         let (labels, in_labels_file) = self.labels.read(opened)?;
         let in_labels = |error: EvaluateError| match error {
             EvaluateError::Data(error) => RunError::from(error),
-            error => match Err::<(), _>(error).context(|| self.labels.file.display().to_string()) {
+            error => match Err::<(), _>(error)
+                .context(|| address::shown_path(&self.labels.file).display().to_string())
+            {
                 Err(error) => error,
                 Ok(()) => RunError::usage("labels", "cannot be used"),
             },

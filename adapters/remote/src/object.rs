@@ -14,6 +14,8 @@ use crate::failure::Failure;
 /// The first pause before a request is made again; each is twice as long as the one before, up to the longest.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+/// The status of an answer to who asks for what is behind the end.
+const NOT_SATISFIABLE: &str = "416";
 /// Bytes of one request.
 pub(crate) const MAX_REQUEST_BYTES: u64 = 8 << 20;
 /// Requests at a time.
@@ -83,7 +85,7 @@ pub(crate) struct Object {
 impl Object {
     /// The object at the very place that a client is for.
     pub(crate) async fn at(client: Client) -> DataResult<Self> {
-        let (meta, ranges) = tried(&client, &client.shown, || stat(&client)).await?;
+        let (meta, ranges) = tried(&client, &client.shown, || stat(&client, &client.path)).await?;
         let (path, shown) = (client.path.clone(), client.shown.clone());
         Ok(Self { client, path, shown, version: Version::of(&meta), ranges })
     }
@@ -98,9 +100,28 @@ impl Object {
         // A weak ETag never matches where bytes must be the same.
         let if_match = self.version.e_tag.clone().filter(|tag| !tag.starts_with("W/"));
         let options = GetOptions { range: Some(range.into()), if_match, ..GetOptions::default() };
-        let got = self.client.store.get_opts(&self.path, options).await?;
+        let got = match self.client.store.get_opts(&self.path, options).await {
+            Ok(got) => got,
+            Err(error) => return Err(self.explained(error.into()).await),
+        };
         self.check(&got.meta)?;
         self.complete(got.bytes().await?.to_vec(), len)
+    }
+
+    /// A part that cannot be given may be one that the object has no more.
+    async fn explained(&self, failure: Failure) -> Failure {
+        let no_part = match &failure {
+            Failure::NoRanges => true,
+            Failure::Passing(words) => words.contains(NOT_SATISFIABLE),
+            _ => false,
+        };
+        if no_part
+            && let Ok((meta, _)) = stat(&self.client, &self.path).await
+            && let Err(changed) = self.check(&meta)
+        {
+            return changed;
+        }
+        failure
     }
 
     /// Refuses an answer that is of another content.
@@ -129,17 +150,17 @@ impl Object {
 
 /// What an object is, and whether the store gives parts of it. A web server is asked for the first byte: an address that
 /// is signed is signed for reading only.
-async fn stat(client: &Client) -> Result<(ObjectMeta, bool), Failure> {
+async fn stat(client: &Client, path: &Path) -> Result<(ObjectMeta, bool), Failure> {
     if client.lists {
-        return Ok((client.store.head(&client.path).await?, true));
+        return Ok((client.store.head(path).await?, true));
     }
     let first = GetOptions { range: Some((0..1).into()), ..GetOptions::default() };
-    match client.store.get_opts(&client.path, first).await.map_err(Failure::from) {
+    match client.store.get_opts(path, first).await.map_err(Failure::from) {
         Ok(got) => Ok((got.meta, true)),
         // Of an empty file there is no first byte.
-        Err(Failure::NoRanges) => Ok((client.store.get(&client.path).await?.meta, false)),
-        Err(Failure::Passing(words)) if words.contains("416") => {
-            Ok((client.store.get(&client.path).await?.meta, false))
+        Err(Failure::NoRanges) => Ok((client.store.get(path).await?.meta, false)),
+        Err(Failure::Passing(words)) if words.contains(NOT_SATISFIABLE) => {
+            Ok((client.store.get(path).await?.meta, false))
         }
         Err(failure) => Err(failure),
     }

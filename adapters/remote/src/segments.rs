@@ -18,23 +18,61 @@ pub(crate) struct Segments {
 }
 
 impl Segments {
-    /// Bytes of a range, where one part has all of them.
-    pub(crate) fn get(&self, range: Range<u64>) -> Option<&[u8]> {
-        self.parts.range(..=range.start).rev().take(LOOK_BACK).find_map(|(start, bytes)| {
-            let from = usize::try_from(range.start - start).ok()?;
-            bytes.get(from..from + usize::try_from(range.end - range.start).ok()?)
-        })
+    /// What there is from a place on, in one part: of several the most.
+    fn from(&self, at: u64) -> &[u8] {
+        let parts = self.parts.range(..=at).rev().take(LOOK_BACK);
+        let rest = parts.filter_map(|(start, bytes)| bytes.get(usize::try_from(at - start).ok()?..));
+        rest.max_by_key(|rest| rest.len()).unwrap_or_default()
     }
 
-    /// Whether it has all bytes of a range.
-    pub(crate) fn has(&self, range: &Range<u64>) -> bool {
-        self.get(range.clone()).is_some()
+    /// Fills `bytes` from `at` on; false where some of them are not there.
+    pub(crate) fn copy(&self, mut at: u64, mut bytes: &mut [u8]) -> bool {
+        while !bytes.is_empty() {
+            let there = self.from(at);
+            let len = there.len().min(bytes.len());
+            if len == 0 {
+                return false;
+            }
+            let (now, later) = bytes.split_at_mut(len);
+            now.copy_from_slice(&there[..len]);
+            (at, bytes) = (at + len as u64, later);
+        }
+        true
     }
 
-    /// Keeps a part.
+    /// What of a range is not there.
+    pub(crate) fn missing(&self, range: Range<u64>) -> Vec<Range<u64>> {
+        let (mut missing, mut at) = (Vec::new(), range.start);
+        while at < range.end {
+            at += self.from(at).len() as u64;
+            if at >= range.end {
+                break;
+            }
+            let next =
+                self.parts.range(at + 1..).next().map_or(range.end, |(start, _)| (*start).min(range.end));
+            if self.from(at).is_empty() {
+                missing.push(at..next);
+                at = next;
+            }
+        }
+        missing
+    }
+
+    /// Keeps a part; where one starts there already, the longer one.
     pub(crate) fn add(&mut self, start: u64, bytes: Vec<u8>) {
         if self.parts.get(&start).is_some_and(|there| there.len() >= bytes.len()) {
             return;
+        }
+        // Small ones inside of it would hide it from who looks back.
+        let end = start + bytes.len() as u64;
+        let inside = self.parts.range(start + 1..end.max(start + 1));
+        let inside: Vec<u64> =
+            inside.filter(|(at, part)| *at + part.len() as u64 <= end).map(|(at, _)| *at).collect();
+        for at in &inside {
+            self.bytes -= self.parts.remove(at).map_or(0, |part| part.len());
+        }
+        if !inside.is_empty() {
+            self.order.retain(|at| self.parts.contains_key(at));
         }
         self.bytes += bytes.len();
         match self.parts.insert(start, bytes) {
@@ -74,12 +112,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_part_is_found_where_one_has_all_of_it() {
+    fn what_is_there_is_found_whatever_it_came_with() {
         let mut segments = Segments::default();
         segments.add(10, vec![1, 2, 3, 4]);
         segments.add(12, vec![3]);
-        assert_eq!(segments.get(11..14), Some(&[2, 3, 4][..]), "behind a shorter one");
-        assert!(!segments.has(&(9..12)) && !segments.has(&(13..15)) && segments.has(&(14..14)));
+        segments.add(14, vec![5, 6]);
+        let mut bytes = [0; 5];
+        assert!(segments.copy(11, &mut bytes), "behind a shorter one, over two");
+        assert_eq!(bytes, [2, 3, 4, 5, 6]);
+        assert!(!segments.copy(9, &mut bytes) && !segments.copy(12, &mut bytes));
+        segments.add(20, vec![7]);
+        assert_eq!(segments.missing(8..22), [8..10, 16..20, 21..22]);
+        assert!(segments.missing(10..16).is_empty() && segments.missing(3..3).is_empty());
+    }
+
+    #[test]
+    fn a_large_part_is_not_hidden_by_small_ones_inside_of_it() {
+        let mut segments = Segments::default();
+        (0..10).for_each(|i| segments.add(100 * i, vec![1; 10]));
+        segments.add(50, vec![2; 900]);
+        assert!(segments.missing(50..950).is_empty());
+        assert_eq!((segments.bytes, segments.order.len()), (910, 2));
     }
 
     #[test]
@@ -89,7 +142,8 @@ mod tests {
             segments.add(i << 20, vec![0; 1 << 20]);
         }
         assert_eq!(segments.bytes, 64 << 20);
-        assert!(!segments.has(&(0..1)) && segments.has(&(79 << 20..80 << 20)));
+        assert_eq!(segments.missing(0..1), [0..1]);
+        assert!(segments.missing(79 << 20..80 << 20).is_empty());
     }
 
     #[test]

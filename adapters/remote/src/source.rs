@@ -68,13 +68,13 @@ impl Ranged for Source {
         }
         let ahead = {
             let mut state = self.state();
-            if let Some(there) = state.kept.get(offset..end) {
-                bytes.copy_from_slice(there);
+            if state.kept.copy(offset, bytes) {
                 return Ok(());
             }
             let (last_end, last_len) = state.last;
             let goes_on = offset <= last_end && end > last_end;
-            let wanted = if goes_on { (2 * last_len).min(MAX_REQUEST_BYTES) } else { FIRST_BYTES };
+            let wanted =
+                if goes_on { (2 * last_len).clamp(FIRST_BYTES, MAX_REQUEST_BYTES) } else { FIRST_BYTES };
             let to = offset.saturating_add(wanted.max(len)).min(size);
             state.last = (to, wanted);
             to
@@ -93,7 +93,7 @@ impl Ranged for Source {
         let missing: Vec<Range<u64>> = {
             let state = self.state();
             let inside = ranges.iter().map(|r| r.start.min(size)..r.end.min(size));
-            inside.filter(|r| !state.kept.has(r)).collect()
+            inside.flat_map(|r| state.kept.missing(r)).collect()
         };
         let mut left = AHEAD_BYTES;
         let mut wanted = Vec::new();

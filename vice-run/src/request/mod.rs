@@ -7,6 +7,7 @@
 mod command_line;
 mod depth_name;
 mod estimate;
+mod secrets;
 mod word;
 
 use std::collections::BTreeMap;
