@@ -19,7 +19,7 @@ const NOT_SATISFIABLE: &str = "416";
 /// Bytes of one request.
 pub(crate) const MAX_REQUEST_BYTES: u64 = 8 << 20;
 /// Requests at a time.
-pub(crate) const REQUESTS_AT_A_TIME: usize = 8;
+pub(crate) const REQUESTS_AT_A_TIME: usize = 16;
 
 /// What tells one content of an object from another.
 #[derive(Clone, Debug, PartialEq, Eq)]

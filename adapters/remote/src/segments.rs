@@ -142,14 +142,14 @@ mod tests {
             segments.add(i << 20, vec![0; 1 << 20]);
         }
         assert_eq!(segments.bytes, 64 << 20);
-        assert_eq!(segments.missing(0..1), [0..1]);
+        assert_eq!(segments.missing(0..1).len(), 1);
         assert!(segments.missing(79 << 20..80 << 20).is_empty());
     }
 
     #[test]
     fn ranges_are_merged_over_small_gaps_and_cut_where_they_are_large() {
         assert_eq!(merged(vec![20..30, 0..10, 5..12, 15..15], 4), [0..12, 20..30]);
-        assert_eq!(merged(vec![20..30, 0..10], 10), [0..30]);
+        assert_eq!(merged(vec![20..30, 0..10, 50..51], 10), [0..30, 50..51]);
         assert_eq!(pieces(3..10, 3).collect::<Vec<_>>(), [3..6, 6..9, 9..10]);
     }
 }

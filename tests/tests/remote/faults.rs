@@ -33,7 +33,7 @@ fn what_passes_is_tried_again_and_changes_nothing() {
     let good = Desk::new().evaluated(&recording, &labels, &more);
     server.behave(|b| b.refuse = 3);
     assert_eq!(Desk::new().evaluated(&recording, &labels, &more), good, "503");
-    // Eight requests are on their way at a time, each of which may be cut.
+    // Several requests are on their way at a time, each of which may be cut.
     server.behave(|b| b.cut = 3);
     assert_eq!(Desk::new().evaluated(&recording, &labels, &more), good, "cut connections");
     server.behave(|b| b.tags = false);

@@ -80,7 +80,8 @@ impl BlockFile {
         let Some(listed) = self.listed(block, records)? else { return Ok(Vec::new()) };
         let ends = listed.iter().skip(1).map(|l| l.at).chain([block.stored]);
         let first = listed.first().map_or(block.stored, |l| l.at);
-        let mut parts = vec![block.offset..block.offset + first];
+        let mut parts = Vec::with_capacity(listed.len() + 1);
+        parts.push(block.offset..block.offset + first);
         for (message, end) in listed.iter().zip(ends) {
             let len = match wanted(message.channel, state, scan) {
                 Want::All => end - message.at,

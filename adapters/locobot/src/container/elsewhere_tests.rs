@@ -160,6 +160,78 @@ fn an_index_spares_images_and_what_nobody_wants() {
     }
 }
 
+/// The same file with its chunks compressed, and its index as it is then.
+fn compressed(bytes: &[u8]) -> Vec<u8> {
+    let put = |out: &mut Vec<u8>, opcode: u8, body: &[u8]| {
+        out.push(opcode);
+        out.extend((body.len() as u64).to_le_bytes());
+        out.extend(body);
+    };
+    let word = |body: &[u8], at: usize| u64::from_le_bytes(body[at..at + 8].try_into().unwrap());
+    let (mut out, mut at) = (bytes[..8].to_vec(), 8);
+    // By where a chunk started: where it starts now, its bytes, and those of its messages.
+    let mut moved = std::collections::BTreeMap::new();
+    let mut summary_at = 0;
+    while at < bytes.len() - 8 {
+        let len = word(bytes, at + 1) as usize;
+        let (opcode, body) = (bytes[at], &bytes[at + 9..at + 9 + len]);
+        match opcode {
+            // Times, size and check sum; then the name of the compression, which is empty, and the records.
+            0x06 => {
+                let packed = zstd::bulk::compress(&body[40..], 1).unwrap();
+                let mut new = body[..28].to_vec();
+                new.extend(4_u32.to_le_bytes());
+                new.extend(b"zstd");
+                new.extend((packed.len() as u64).to_le_bytes());
+                new.extend(&packed);
+                moved.insert(at as u64, (out.len() as u64, 9 + new.len() as u64, packed.len() as u64));
+                put(&mut out, opcode, &new);
+            }
+            0x08 => {
+                let (start, chunk_len, packed) = moved[&word(body, 16)];
+                let offsets = u32::from_le_bytes(body[32..36].try_into().unwrap()) as usize;
+                let rest = 36 + offsets;
+                let mut new = [&body[..16], &start.to_le_bytes(), &chunk_len.to_le_bytes()].concat();
+                new.extend(&body[32..rest + 8]);
+                new.extend(4_u32.to_le_bytes());
+                new.extend(b"zstd");
+                new.extend(packed.to_le_bytes());
+                new.extend(&body[rest + 20..rest + 28]);
+                put(&mut out, opcode, &new);
+            }
+            0x02 => put(&mut out, opcode, &[&(summary_at as u64).to_le_bytes()[..], &[0; 12]].concat()),
+            // Places in the summary, which are others now.
+            0x0e => {}
+            _ => put(&mut out, opcode, body),
+        }
+        if opcode == 0x0f {
+            summary_at = out.len();
+        }
+        at += 9 + len;
+    }
+    out.extend(&bytes[at..]);
+    out
+}
+
+#[test]
+fn of_what_is_compressed_only_chunks_that_nobody_wants_are_left() {
+    let mut messages = large();
+    let mut state = 1_u64;
+    for byte in
+        messages.iter_mut().filter(|m| m.bytes[1].len() > 100_000).flat_map(|m| &mut m.bytes[1][1024..])
+    {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        *byte = (state >> 56) as u8;
+    }
+    // Images and scans are half of the file each.
+    let by_topic = compressed(&chunked(&messages, true));
+    let (read, len) = (both(&by_topic), by_topic.len() as u64);
+    assert!(len > 4_000_000 && 2 * read < len + 100_000, "{read} of {len}");
+    let mixed = compressed(&chunked(&messages, false));
+    let (read, len) = (both(&mixed), mixed.len() as u64);
+    assert!(read <= len + len / 20, "once: {read} of {len}");
+}
+
 #[test]
 fn without_an_index_it_is_walked() {
     let bytes = chunked(&large(), false);
