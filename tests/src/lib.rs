@@ -43,6 +43,11 @@ pub fn shared_json(relative: &str) -> Option<serde_json::Value> {
 
 /// Builds a package of the workspace once more, in this test's own profile, and gives the folder its artefacts are in.
 pub fn build(package: &str) -> PathBuf {
+    build_with(package, "")
+}
+
+/// As [`build`], with features of the package.
+pub fn build_with(package: &str, features: &str) -> PathBuf {
     let test_program = std::env::current_exe().expect("a test knows where it is");
     // target/<profile>/deps/<test>
     let folder =
@@ -56,6 +61,7 @@ pub fn build(package: &str) -> PathBuf {
         .current_dir(root())
         .args(["build", "--quiet", "--locked", "--package", package, "--profile", profile, "--target-dir"])
         .arg(target)
+        .args(["--features", features])
         .status()
         .expect("cargo can be run");
     assert!(status.success(), "building {package} failed");

@@ -6,7 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use vice_core::camera::Camera;
 use vice_core::dataset::Dataset;
 use vice_core::time::Stamp;
-use vice_run::error::RunResult;
+use vice_files::address::is_address;
+use vice_run::error::{RunError, RunResult};
 use vice_run::request::DepthName;
 use vice_run::request::Request;
 
@@ -42,6 +43,10 @@ impl Desk {
         request.protocol.check()?;
         // Suggestions look at whatever knows the scene, besides the source that dots take their depth from.
         request.depth.check(&[DepthName::ZCam, DepthName::ZMap])?;
+        if is_address(&request.labels.file) {
+            let problem = "labels are written while they are made, and this lies elsewhere";
+            return Err(RunError::usage("labels", problem).advise("name a file of this machine"));
+        }
         let opened = request.dataset.open()?;
         let chosen = request.protocol.frames(&opened)?;
         let target =

@@ -117,6 +117,20 @@ impl DataError {
         self
     }
 
+    /// Names another place wherever it names `from` or what lies below it: what is read may be a copy of what was asked for.
+    #[must_use]
+    pub fn renamed(mut self, from: &Path, to: &str) -> Self {
+        let told = |text: &str| text.replace(&*from.to_string_lossy(), to);
+        self.path = self.path.map(|path| PathBuf::from(told(&path.to_string_lossy())));
+        self.problem = told(&self.problem);
+        self.hint = self.hint.as_deref().map(told);
+        self.source = self.source.map(|source| match source.downcast::<Self>() {
+            Ok(inner) => Box::new(inner.renamed(from, to)) as Box<dyn std::error::Error + Send + Sync>,
+            Err(other) => other,
+        });
+        self
+    }
+
     /// What is wrong, without place and hint.
     pub fn problem(&self) -> &str {
         &self.problem
@@ -197,6 +211,14 @@ mod tests {
         let wrapped = DataError::of(std::io::Error::other("disk on fire")).at("a.bag").hint("call for help");
         assert_eq!(one_line(&wrapped), "a.bag: disk on fire (call for help)");
         assert!(std::error::Error::source(&wrapped).is_some_and(|s| s.is::<std::io::Error>()));
+    }
+
+    #[test]
+    fn a_copy_is_told_by_what_it_is_a_copy_of() {
+        let inner = DataError::new("cut off").at("/cache/1/b/x.csv").line(3);
+        let error = DataError::new("beside /cache/1/b").at("/cache/1/b/y").because(inner);
+        let told = one_line(&error.renamed(Path::new("/cache/1/b"), "s3://b"));
+        assert_eq!(told, "s3://b/y: beside s3://b: s3://b/x.csv:3: cut off");
     }
 
     #[test]

@@ -44,7 +44,7 @@ impl Conversion {
         };
         let name = self.stream.to_string();
         let is_stream = dataset.streams().contains(&name);
-        let file = self.stream.path().is_some_and(|path| path.is_file());
+        let file = self.stream.is_file();
         let mut trajectory = if !is_stream && file {
             let read = self.stream.read_file(&ReadOptions::default())?;
             leniency::log(&read.suspicions);

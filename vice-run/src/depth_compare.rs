@@ -9,6 +9,7 @@ use vice_core::statistics::{quantile, sorted};
 use vice_core::suspicion::Suspicions;
 use vice_core::time::Stamp;
 use vice_core::track::{lift, track};
+use vice_files::address;
 
 use crate::error::{Context, RunError, RunResult};
 use crate::report::table;
@@ -80,7 +81,7 @@ pub fn compare_depths(request: &Request) -> RunResult<DepthComparison> {
     let (labels, mut suspicions) = request.labels.read(opened)?;
     let sources = request.depth.make_all(opened)?;
     let selection = Selection::new(&labels, &opened.frames, &opened.camera, &request.window())
-        .context(|| request.labels.file.display().to_string())?;
+        .context(|| address::shown_path(&request.labels.file).display().to_string())?;
     let key_points: Vec<KeyPoint> =
         selection.keyframes().map(|k| key_point(&scene, &sources, &k)).collect::<RunResult<_>>()?;
     suspicions.extend(opened.dataset.suspicions().into_iter().chain(opened.suspicions()));

@@ -98,7 +98,7 @@ pub fn diagnose_all(
                     let calibration = corrected(opened, evaluation, streams, &found);
                     let result = DiagnosisResult {
                         diagnosis: found.document,
-                        request: request.clone(),
+                        request: request.without_secrets(),
                         time_offset_s: evaluation.streams[stream].time_offset.as_secs_f64(),
                     };
                     (result, calibration)

@@ -4,9 +4,11 @@ use vice_core::depth::DepthSource;
 use vice_core::evaluate::{EvaluateError, Evaluation, SampleSink, Selection, evaluate, evaluate_streaming};
 use vice_core::label::LabelSet;
 use vice_core::suspicion::Suspicions;
+use vice_files::address;
 
 use crate::error::{Context, RunError, RunResult};
 use crate::open::Opened;
+use crate::place::Place;
 use crate::request::{LabelsSpec, Request};
 use crate::result::{OWN_ANCHOR, ResultDocument, Used};
 use crate::streams::LoadedStreams;
@@ -47,9 +49,11 @@ impl LabelsSpec {
         let (labels, suspicions) = match opened.in_memory.labels(&self.file)? {
             Some(labels) => (labels.clone(), Suspicions::new()),
             None => {
-                let file = vice_files::labels::read_file(&self.file, Some(&opened.frames))?;
+                let place = Place::of_file(&self.file)?;
+                let file = place.told(vice_files::labels::read_file(place.path(), Some(&opened.frames)))?;
+                let shown = address::shown_path(&self.file);
                 file.check_image_size(opened.camera.width(), opened.camera.height())
-                    .map_err(|e| e.at(&self.file))?;
+                    .map_err(|e| e.at(shown))?;
                 (file.labels, file.suspicions)
             }
         };
@@ -125,7 +129,9 @@ impl Request {
         let (labels, in_labels_file) = self.labels.read(opened)?;
         let in_labels = |error: EvaluateError| match error {
             EvaluateError::Data(error) => RunError::from(error),
-            error => match Err::<(), _>(error).context(|| self.labels.file.display().to_string()) {
+            error => match Err::<(), _>(error)
+                .context(|| address::shown_path(&self.labels.file).display().to_string())
+            {
                 Err(error) => error,
                 Ok(()) => RunError::usage("labels", "cannot be used"),
             },

@@ -18,6 +18,7 @@
 //! Nothing here prints, and nothing knows a command line.
 #![forbid(unsafe_code)]
 
+mod away;
 pub mod batch;
 pub mod bench;
 pub mod columns;
@@ -36,6 +37,7 @@ mod imu_start;
 pub mod in_memory;
 pub mod info;
 pub mod open;
+pub mod place;
 pub mod plugin;
 pub mod report;
 pub mod request;

@@ -1,5 +1,6 @@
 //! Opening a recording: its format, the camera in use, and what the user overrides.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use vice_core::camera::Camera;
@@ -10,11 +11,14 @@ use vice_core::frames::World;
 use vice_core::registry::Registry;
 use vice_core::suspicion::Suspicion;
 use vice_core::time::{Span, Stamp};
+use vice_files::address::{self, is_address};
 use vice_files::calibration::CalibrationFile;
 
+use crate::away::Away;
 use crate::error::{RunError, RunResult};
 use crate::formats;
 use crate::in_memory::InMemory;
+use crate::place::Place;
 use crate::request::{DatasetSpec, Protocol};
 use crate::scans::Scans;
 
@@ -55,8 +59,17 @@ impl DatasetSpec {
     /// # Errors
     /// [`RunError`] if no format reads it.
     pub fn open_raw(&self, registry: &Registry) -> RunResult<Arc<dyn Dataset>> {
-        let options = OpenOptions { settings: self.set.clone() };
-        Ok(Arc::from(registry.open(&self.path, self.format.as_deref(), &options)?))
+        let mut options = OpenOptions { settings: self.set.clone() };
+        // A setting may name a file.
+        for value in options.settings.values_mut().filter(|v| is_address(v)) {
+            *value = Place::of_file(Path::new(value))?.path().to_string_lossy().into_owned();
+        }
+        let place = Place::of_data_set(&self.path)?;
+        let dataset = place.told(registry.open(place.path(), self.format.as_deref(), &options))?;
+        Ok(match place.is_elsewhere() {
+            true => Arc::new(Away { inner: dataset, place: place.kept() }),
+            false => Arc::from(dataset),
+        })
     }
 
     /// A data set that is open already, with the camera and the overrides of this request.
@@ -132,7 +145,8 @@ impl DatasetSpec {
 
     /// Why there is no camera: the data set may know.
     fn no_camera(&self, dataset: &dyn Dataset) -> RunError {
-        let path = self.path.display();
+        let path = address::shown_path(&self.path);
+        let path = path.display();
         match dataset.suspicions().into_iter().find(|s| s.code == "no-camera") {
             Some(reason) => RunError::missing(format!("{path}: {}", reason.line())),
             None => RunError::missing(format!("{path}: the data set has no camera")),
@@ -140,7 +154,9 @@ impl DatasetSpec {
     }
 
     fn calibration(&self) -> RunResult<Option<CalibrationFile>> {
-        Ok(self.calibration.as_ref().map(CalibrationFile::read).transpose()?)
+        let Some(file) = &self.calibration else { return Ok(None) };
+        let place = Place::of_file(file)?;
+        Ok(Some(place.told(CalibrationFile::read(place.path()))?))
     }
 
     fn floor(&self) -> RunResult<Option<Floor>> {

@@ -25,6 +25,7 @@ use crate::error::{RunError, RunResult};
 use crate::imu_start::ImuStart;
 use crate::in_memory::own_name;
 use crate::open::Opened;
+use crate::place::Place;
 use crate::request::{Anchor, EstimateFrame, EstimateSpec, IMU_EULER, ReferenceSpec, StreamsSpec};
 
 /// The streams, the reference first, and which of them is the anchor.
@@ -193,7 +194,7 @@ impl Loader<'_> {
         if let Some(trajectory) = self.opened.in_memory.trajectory(&name)? {
             return Ok(trajectory.clone());
         }
-        if !spec.path().is_some_and(Path::exists) {
+        if !spec.is_file() {
             let streams = self.dataset().streams();
             let streams = if streams.is_empty() { "none".to_string() } else { streams.join(", ") };
             return Err(RunError::missing(format!(
@@ -241,7 +242,8 @@ impl Loader<'_> {
                 })
             }
             EstimateFrame::File(file) => {
-                let body_from_estimate: Rigid<Body, Sensor> = rigid_file::read(file)?;
+                let place = Place::of_file(file)?;
+                let body_from_estimate: Rigid<Body, Sensor> = place.told(rigid_file::read(place.path()))?;
                 let estimate_from_body = body_from_estimate.inverse();
                 Ok(trajectory.map_poses(|_, pose| pose.reinterpret() * estimate_from_body))
             }
@@ -351,7 +353,7 @@ pub fn plain_name(spec: &EstimateSpec) -> String {
     let word = own_name(&spec.word()).to_string();
     let path = Path::new(&word);
     match path.extension() {
-        Some(_) if path.exists() => path.file_stem().and_then(|s| s.to_str()).unwrap_or(&word).to_string(),
+        Some(_) if spec.is_file() => path.file_stem().and_then(|s| s.to_str()).unwrap_or(&word).to_string(),
         _ => word,
     }
 }

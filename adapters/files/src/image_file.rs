@@ -12,6 +12,8 @@ use vice_core::dataset::{DepthImage, Image, PixelFormat};
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::time::Stamp;
 
+use crate::elsewhere;
+
 /// Columns or rows beyond which a picture is refused.
 pub const MAX_SIDE_PX: u32 = 32_768;
 /// Bytes beyond which the decoder stops.
@@ -64,6 +66,11 @@ pub fn decode_depth_png(bytes: &[u8], stamp: Stamp, metres_per_count: f64) -> Da
 /// [`DataError`] if the file cannot be read or is no PNG or JPEG.
 pub fn dimensions(path: impl AsRef<Path>) -> DataResult<(u32, u32)> {
     let path = path.as_ref();
+    if let Some(bytes) = elsewhere::read(path)? {
+        let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+        let reader = reader.map_err(|e| unreadable(path, e))?;
+        return reader.into_dimensions().map_err(|e| not_an_image(e).at(path));
+    }
     let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
     let reader = reader.map_err(|e| unreadable(path, e))?;
     reader.into_dimensions().map_err(|e| not_an_image(e).at(path))
@@ -147,7 +154,10 @@ pub fn encode_depth_png(image: &DepthImage, metres_per_count: f64) -> DataResult
 /// [`DataError`] with the path.
 pub fn read_bytes(path: impl AsRef<Path>) -> DataResult<Vec<u8>> {
     let path = path.as_ref();
-    fs::read(path).map_err(|e| unreadable(path, e))
+    match elsewhere::read(path)? {
+        Some(bytes) => Ok(bytes),
+        None => fs::read(path).map_err(|e| unreadable(path, e)),
+    }
 }
 
 fn encode(bytes: &[u8], width: u32, height: u32, colour: ExtendedColorType) -> DataResult<Vec<u8>> {

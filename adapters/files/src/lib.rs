@@ -13,12 +13,15 @@
 //! | [`leniency`] | what readers repair or leave out, one rule for all |
 //! | [`not_text`] | recordings and archives given where text is expected |
 //! | [`paths`] | names from files, kept below their folder |
+//! | [`address`], [`elsewhere`] | data that is named by a URL, and files that are read by ranges |
 //! | [`atomic`] | writing all or nothing |
 #![forbid(unsafe_code)]
 
+pub mod address;
 pub mod atomic;
 pub mod calibration;
 pub mod columns;
+pub mod elsewhere;
 pub mod heading;
 pub mod image_file;
 pub mod imu_file;

@@ -18,6 +18,7 @@ use std::time::Duration;
 
 use vice_core::dataset::{Image, PixelFormat};
 use vice_core::error::{DataError, DataResult};
+use vice_files::elsewhere;
 
 use crate::ffmpeg::{Ffmpeg, Running};
 use crate::mov::{self, MovIndex};
@@ -192,6 +193,8 @@ impl Film {
         // Bit-exact scaling: the same pixels on every machine.
         let output = ["-vf", &filter, "-sws_flags", "+accurate_rnd+bitexact", "-pix_fmt", pixels];
         let output = output.into_iter().chain(["-c:v", coder, "-f", "image2pipe"]).map(OsString::from);
+        // FFmpeg opens nothing but files here.
+        elsewhere::bring(&self.path)?;
         let running = self.ffmpeg.start(&self.path, &input, &output.collect::<Vec<_>>())?;
         state.stats.starts += 1;
         Ok(Decoder { running, next: index })

@@ -9,6 +9,7 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 use vice_core::error::{DataError, DataResult};
+use vice_files::elsewhere::{self, Reader};
 
 /// Bytes of `moov` beyond which a film is refused; a day at 120 frames a second needs about 200 MB.
 const MAX_INDEX_BYTES: u64 = 512 << 20;
@@ -51,16 +52,20 @@ pub(crate) fn read(path: &Path) -> DataResult<MovIndex> {
         std::io::ErrorKind::NotFound => DataError::new("no such film").at(path),
         _ => DataError::new("cannot be read").at(path).because(e),
     };
+    if let Some(film) = elsewhere::find(path)? {
+        let length = film.size_bytes();
+        return index(&mut Reader::new(film), length).map_err(failed).flatten().map_err(|e| e.at(path));
+    }
     let meta = std::fs::metadata(path).map_err(failed)?;
     if !meta.is_file() {
         return Err(DataError::new("is not a file").at(path));
     }
     let mut file = File::open(path).map_err(failed)?;
-    find_index(&mut file, meta.len())
-        .map_err(failed)
-        .flatten()
-        .and_then(|moov| parse_index(&moov, meta.len()))
-        .map_err(|e| e.at(path))
+    index(&mut file, meta.len()).map_err(failed).flatten().map_err(|e| e.at(path))
+}
+
+fn index(file: &mut (impl Read + Seek), length: u64) -> std::io::Result<DataResult<MovIndex>> {
+    Ok(find_index(file, length)?.and_then(|moov| parse_index(&moov, length)))
 }
 
 /// Walks the outermost boxes and gives the content of `moov`.

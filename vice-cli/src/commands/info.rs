@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use vice_run::core::dataset::Probe;
 use vice_run::formats;
 use vice_run::info::describe;
+use vice_run::place::Place;
 
 use crate::inputs::DatasetArgs;
 use crate::terminal::{self, Outcome, printable};
@@ -22,9 +23,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let spec = args.dataset.spec();
     let registry = formats::registry(&spec.plugins)?;
     if spec.format.is_none()
-        && let (factory, Probe::Collection(runs)) = registry.detect(&spec.path)?
+        && let place = Place::of_data_set(&spec.path)?
+        && let (factory, Probe::Collection(runs)) = place.told(registry.detect(place.path()))?
     {
-        return list(&factory.info().name, &spec.path, &runs);
+        return list(&factory.info().name, &place, &runs);
     }
     let dataset = spec.open_raw(&registry)?;
     if spec.camera.is_some() {
@@ -34,10 +36,11 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-fn list(format: &str, path: &Path, runs: &[PathBuf]) -> anyhow::Result<Outcome> {
-    let mut text = format!("{}: {} {format} data sets\n", path.display(), runs.len());
+fn list(format: &str, place: &Place<'_>, runs: &[PathBuf]) -> anyhow::Result<Outcome> {
+    let told = |path: &Path| place.in_words(&path.display().to_string());
+    let mut text = format!("{}: {} {format} data sets\n", told(place.path()), runs.len());
     for run in runs {
-        writeln!(text, "  {}", printable(&run.display().to_string()))?;
+        writeln!(text, "  {}", printable(&told(run)))?;
     }
     terminal::print(&text)?;
     Ok(Outcome::Done)

@@ -8,7 +8,7 @@ use vice_run::request::{DatasetSpec, PluginsSpec};
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Data set")]
 pub(crate) struct DatasetArgs {
-    /// Folder or file of the data set.
+    /// Folder or file of the data set; in a build for that its address, such as s3://bucket/run.mcap.
     #[arg(value_name = "DATASET", required = true)]
     pub(crate) path: Option<PathBuf>,
     /// Format of the data set [default: found by looking].

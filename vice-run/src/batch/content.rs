@@ -2,7 +2,8 @@
 //!
 //! A file up to [`WHOLE_BYTES`] is hashed whole. A larger one is hashed by its size and [`BLOCKS`] blocks spread over it,
 //! the first and the last among them: a recording has its index there. An image is hashed by its size, its first and its
-//! last bytes, where PNG keeps its checksums; an evaluation decodes none but those of depth.
+//! last bytes, where PNG keeps its checksums; an evaluation decodes none but those of depth. What lies elsewhere is not
+//! read: its hash is of its address and of what the server says of it.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, Metadata};
@@ -14,7 +15,10 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use vice_core::error::{DataError, DataResult};
+use vice_files::address::is_address;
 use vice_files::atomic::{self, Overwrite};
+
+use crate::place;
 
 /// Largest file that is hashed whole.
 const WHOLE_BYTES: u64 = 64 << 20;
@@ -43,6 +47,11 @@ struct Known {
     size: u64,
     modified_ns: u64,
     content: Content,
+}
+
+/// What is not there.
+fn missing() -> Content {
+    Content { hash: "missing".to_string(), sampled: false }
 }
 
 /// Hashes that are known, by path, size and time of the last change.
@@ -81,11 +90,17 @@ impl Hashes {
         if let Some(content) = &*slot {
             return Ok(content.clone());
         }
+        if is_address(path) {
+            let known = place::identity(path)?;
+            let content = known.map_or_else(missing, |(hash, certain)| Content { hash, sampled: !certain });
+            *slot = Some(content.clone());
+            return Ok(content);
+        }
         let failed = |e: io::Error| DataError::new("cannot be read").at(path).because(e);
         let content = match fs::metadata(path) {
             Ok(meta) if meta.is_dir() => self.folder(path).map_err(failed)?,
             Ok(meta) => self.file(path, &meta).map_err(failed)?,
-            Err(_) => Content { hash: "missing".to_string(), sampled: false },
+            Err(_) => missing(),
         };
         *slot = Some(content.clone());
         Ok(content)

@@ -2,9 +2,12 @@
 
 use std::path::{Component, Path, PathBuf};
 
+use vice_files::address::is_address;
+
 /// Whether a path has a wildcard in it.
 pub(super) fn is_glob(path: &str) -> bool {
-    path.contains(['*', '?'])
+    // A `?` of an address starts its query.
+    !is_address(path) && path.contains(['*', '?'])
 }
 
 /// All paths below `base` that a pattern stands for, as the pattern would be written without its wildcards, sorted by

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use vice_core::error::{DataError, DataResult, ErrorKind};
+use vice_files::address;
 
 use super::cells::{Cells, RawRow, wrong};
 use super::field::{self, Cell, DATASET, ESTIMATOR, FLIGHT, GROUP, RUN_ID};
@@ -106,8 +107,9 @@ fn runs(base: &Path, defaults: &Cells, row: &RawRow) -> DataResult<Vec<Row>> {
 }
 
 fn one(cells: &Cells, dataset: &str, line: u64) -> DataResult<Row> {
-    let name = Path::new(dataset).file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let filled = |text: &str| text.replace("{dataset}", dataset).replace("{name}", &name);
+    let shown = address::shown(dataset);
+    let name = Path::new(&*shown).file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let filled = |text: &str| text.replace("{dataset}", &shown).replace("{name}", &name);
     let mut fields = field::start();
     for (place, (cell, at)) in
         cells.iter().filter(|(p, _)| ![RUN_ID, GROUP, FLIGHT, ESTIMATOR, DATASET].contains(&p.as_str()))

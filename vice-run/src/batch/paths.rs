@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use vice_files::address::is_address;
+
 use crate::request::{EstimateFrame, EstimateSpec, ReferenceSpec, Request};
 
 /// The request with paths from where the program runs. A name that may be a stream or a file is a file where there is
@@ -9,7 +11,7 @@ use crate::request::{EstimateFrame, EstimateSpec, ReferenceSpec, Request};
 pub(super) fn resolved(request: &Request, base: &Path) -> Request {
     let mut request = request.clone();
     let join = |path: &mut PathBuf| {
-        if !path.as_os_str().is_empty() {
+        if !path.as_os_str().is_empty() && !is_address(&*path) {
             *path = base.join(&*path);
         }
     };
@@ -26,7 +28,7 @@ pub(super) fn resolved(request: &Request, base: &Path) -> Request {
     }
     let estimate = |spec: &mut EstimateSpec| match spec {
         EstimateSpec::Named(name) => *name = if_file(base, name),
-        EstimateSpec::Relative(path) => *path = base.join(&*path),
+        EstimateSpec::Relative(path) => join(path),
         EstimateSpec::ImuEuler => {}
     };
     request.streams.estimates.iter_mut().for_each(estimate);
@@ -45,7 +47,7 @@ fn if_file(base: &Path, name: &str) -> String {
 pub(super) fn files(resolved: &Request) -> Vec<PathBuf> {
     let mut files = resolved.inputs();
     files.extend(resolved.dataset.plugins.files.iter().cloned());
-    files.extend(resolved.dataset.set.values().map(PathBuf::from).filter(|p| p.is_file()));
+    files.extend(resolved.dataset.set.values().map(PathBuf::from).filter(|p| is_address(p) || p.is_file()));
     files.retain(|f| *f != resolved.dataset.path);
     files
 }

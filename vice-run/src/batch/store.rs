@@ -7,6 +7,7 @@ use std::time::{Duration, SystemTime};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use vice_core::error::{DataError, DataResult, ErrorKind};
+use vice_files::address::shown_path;
 use vice_files::atomic::{self, Overwrite};
 
 use super::content::hex;
@@ -112,7 +113,7 @@ impl Store {
             group: row.group.clone(),
             flight: row.flight.clone(),
             estimators: row.estimators.clone(),
-            dataset: row.request.dataset.path.display().to_string(),
+            dataset: shown_path(&row.request.dataset.path).display().to_string(),
             asked: asked(&row.request),
         });
         let listed = Listed { schema: BATCH_SCHEMA.to_string(), rows: rows.collect() };

@@ -1,15 +1,23 @@
 //! A request as the command line that asks for the same.
 
+use std::path::Path;
+
+use vice_files::address::{shown, shown_path};
+
 use super::Request;
 use crate::text::shell_word;
 
 pub(super) fn of(request: &Request) -> String {
     let mut words: Vec<String> = vec!["vice".to_string(), "evaluate".to_string()];
-    words.push(request.dataset.path.display().to_string());
+    words.push(told(&request.dataset.path));
     for (name, value) in options(request) {
         words.extend([format!("--{name}"), value]);
     }
     words.iter().map(|w| shell_word(w)).collect::<Vec<_>>().join(" ")
+}
+
+fn told(path: &Path) -> String {
+    shown_path(path).display().to_string()
 }
 
 fn options(request: &Request) -> Vec<(&'static str, String)> {
@@ -21,14 +29,14 @@ fn options(request: &Request) -> Vec<(&'static str, String)> {
     add("format", dataset.format.clone());
     add("camera", dataset.camera.clone());
     for (key, value) in &dataset.set {
-        add("set", Some(format!("{key}={value}")));
+        add("set", Some(format!("{key}={}", shown(value))));
     }
     for file in &dataset.plugins.files {
         add("plugin", Some(file.display().to_string()));
     }
-    add("calibration", dataset.calibration.as_ref().map(|p| p.display().to_string()));
+    add("calibration", dataset.calibration.as_deref().map(told));
     add("floor-plane", dataset.floor_plane.and_then(|p| numbers(&p)));
-    add("labels", Some(labels.file.display().to_string()));
+    add("labels", Some(told(&labels.file)));
     add("points", list(labels.points.clone()));
     let observations =
         (labels.observations != Default::default()).then(|| labels.observations.name().to_string());
@@ -41,7 +49,7 @@ fn options(request: &Request) -> Vec<(&'static str, String)> {
     let frame = streams.estimate_frame.to_string();
     add("estimate-frame", (frame != "body").then_some(frame));
     add("estimate-as", list(streams.estimate_as.iter().map(ToString::to_string).collect()));
-    add("times", streams.times.as_ref().map(|p| p.display().to_string()));
+    add("times", streams.times.as_deref().map(told));
     add("time-offset", streams.time_offset.map(|s| s.as_secs_f64().to_string()));
     let gap = (streams.max_gap != super::DEFAULT_MAX_GAP).then(|| streams.max_gap.as_secs_f64().to_string());
     add("max-gap", gap);

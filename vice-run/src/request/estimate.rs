@@ -7,7 +7,10 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 use vice_core::error::DataResult;
+use vice_files::address::{is_address, shown, shown_path};
 use vice_files::trajectory::{ReadOptions, TrajectoryFile, read, read_relative};
+
+use crate::place::Place;
 
 /// Starts the name of a file of relative motions.
 const RELATIVE: &str = "rel:";
@@ -17,7 +20,7 @@ pub const IMU_EULER: &str = "imu-euler";
 
 /// A pose stream.
 ///
-/// As text: a name or file as it is, `rel:FILE` for relative motions, `imu-euler`.
+/// As text, which leaves secrets of an address out: a name or file as it is, `rel:FILE` for relative motions, `imu-euler`.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(from = "String", into = "String")]
 pub enum EstimateSpec {
@@ -45,18 +48,27 @@ impl EstimateSpec {
     /// # Errors
     /// [`DataError`](vice_core::error::DataError) if there is no such file, or it holds no poses.
     pub fn read_file(&self, options: &ReadOptions) -> DataResult<TrajectoryFile> {
-        match self {
-            Self::Relative(path) => read_relative(path),
-            Self::Named(name) => read(name, options),
-            Self::ImuEuler => read(IMU_EULER, options),
-        }
+        let Some(path) = self.path() else { return read(IMU_EULER, options) };
+        let place = Place::of_file(path)?;
+        let times = options.times.as_deref().map(Place::of_file).transpose()?;
+        let options =
+            ReadOptions { times: times.as_ref().map(|t| t.path().to_path_buf()), ..options.clone() };
+        place.told(match self {
+            Self::Relative(_) => read_relative(place.path()),
+            _ => read(place.path(), &options),
+        })
+    }
+
+    /// Whether it is a file: one that is elsewhere is looked for where it is read.
+    pub fn is_file(&self) -> bool {
+        self.path().is_some_and(|path| is_address(path) || path.exists())
     }
 
     /// What a stream is called before it is known what else is there.
     pub fn word(&self) -> String {
         match self {
-            Self::Named(name) => name.clone(),
-            Self::Relative(path) => path.display().to_string(),
+            Self::Named(name) => shown(name).into_owned(),
+            Self::Relative(path) => shown_path(path).display().to_string(),
             Self::ImuEuler => IMU_EULER.to_string(),
         }
     }
@@ -83,8 +95,8 @@ impl FromStr for EstimateSpec {
 impl fmt::Display for EstimateSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Named(name) => f.write_str(name),
-            Self::Relative(path) => write!(f, "{RELATIVE}{}", path.display()),
+            Self::Named(name) => f.write_str(&shown(name)),
+            Self::Relative(path) => write!(f, "{RELATIVE}{}", shown_path(path).display()),
             Self::ImuEuler => f.write_str(IMU_EULER),
         }
     }
@@ -211,7 +223,7 @@ impl fmt::Display for EstimateFrame {
         match self {
             Self::Body => f.write_str("body"),
             Self::Camera => f.write_str("camera"),
-            Self::File(path) => write!(f, "{}", path.display()),
+            Self::File(path) => write!(f, "{}", shown_path(path).display()),
         }
     }
 }

@@ -2,11 +2,12 @@
 //!
 //! A command line, a row of a batch, a call from Python and a result document all hold the same [`Request`]. Unknown
 //! fields are refused; what is left out has the default that is stated here. Files are named as they were given, so
-//! that a relative path means the folder in which the request is run.
+//! that a relative path means the folder in which the request is run; addresses are written without their secrets.
 
 mod command_line;
 mod depth_name;
 mod estimate;
+mod secrets;
 mod word;
 
 use std::collections::BTreeMap;
@@ -55,19 +56,28 @@ pub struct Request {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DatasetSpec {
-    /// Folder or file.
+    /// Folder or file, or the address of one.
+    #[serde(serialize_with = "word::path::serialize")]
     pub path: PathBuf,
     /// Format; `None`: found by looking.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub format: Option<String>,
     /// Settings of the format, by key.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(
+        default,
+        skip_serializing_if = "BTreeMap::is_empty",
+        serialize_with = "word::settings::serialize"
+    )]
     pub set: BTreeMap<String, String>,
     /// Camera; `None`: the first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<String>,
     /// Calibration file that overrides the data set's: TOML, or a Kalibr camchain.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "word::path_option::serialize"
+    )]
     pub calibration: Option<PathBuf>,
     /// Floor plane `n·p + d = 0` in the world in place of the data set's: nx, ny, nz, d in metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -100,6 +110,7 @@ impl PluginsSpec {
 #[serde(deny_unknown_fields)]
 pub struct LabelsSpec {
     /// CSV, JSON, CVAT's XML, or the authors' pickle.
+    #[serde(serialize_with = "word::path::serialize")]
     pub file: PathBuf,
     /// Only these points; empty: all.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -149,7 +160,11 @@ pub struct StreamsSpec {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub estimate_as: Vec<Convention>,
     /// Times of KITTI files; `None`: times.txt beside each.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "word::path_option::serialize"
+    )]
     pub times: Option<PathBuf>,
     /// Seconds added to the stamps of the estimates; `None`: what the calibration says, or nothing.
     #[serde(

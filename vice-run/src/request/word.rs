@@ -1,4 +1,4 @@
-//! Spans as decimal seconds in documents.
+//! Spans as decimal seconds in documents, and addresses without their secrets.
 
 pub(crate) mod seconds {
     use serde::{Deserialize, Deserializer, Serializer, de::Error};
@@ -27,5 +27,43 @@ pub(crate) mod seconds_option {
     pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Span>, D::Error> {
         let seconds = Option::<f64>::deserialize(deserializer)?;
         seconds.map(Span::from_secs_f64).transpose().map_err(D::Error::custom)
+    }
+}
+
+/// Paths, of which addresses lose their secrets when they are written.
+pub(crate) mod path {
+    use std::path::Path;
+
+    use serde::{Serialize, Serializer};
+    use vice_files::address::shown_path;
+
+    pub(crate) fn serialize<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+        shown_path(path).serialize(serializer)
+    }
+}
+
+pub(crate) mod path_option {
+    use std::path::PathBuf;
+
+    use serde::{Serialize, Serializer};
+    use vice_files::address::shown_path;
+
+    pub(crate) fn serialize<S: Serializer>(path: &Option<PathBuf>, serializer: S) -> Result<S::Ok, S::Error> {
+        path.as_deref().map(shown_path).serialize(serializer)
+    }
+}
+
+/// Settings, of which some may be addresses.
+pub(crate) mod settings {
+    use std::collections::BTreeMap;
+
+    use serde::Serializer;
+    use vice_files::address::shown;
+
+    pub(crate) fn serialize<S: Serializer>(
+        settings: &BTreeMap<String, String>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(settings.iter().map(|(key, value)| (key, shown(value))))
     }
 }

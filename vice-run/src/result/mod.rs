@@ -71,7 +71,7 @@ impl ResultDocument {
         Self {
             schema: SCHEMA.to_string(),
             vice_version: env!("CARGO_PKG_VERSION").to_string(),
-            request,
+            request: request.without_secrets(),
             used,
             dataset: found.dataset,
             pixel: found.pixel,

@@ -1,13 +1,14 @@
 //! Blocks: the chunks of a bag or an MCAP file, decompressed within bounds and kept while they are being used.
 
-use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::Read;
 use std::path::Path;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use rayon::prelude::*;
 use vice_core::error::{DataError, DataResult};
 
+use super::bytes::Bytes;
+use super::indexed::{Indexed, Listed};
 use super::{Locator, Payload, Scan, Visitor};
 
 /// Bytes beyond which a block is refused: recorders write blocks of about a megabyte, or of one message.
@@ -52,7 +53,7 @@ impl Compression {
 }
 
 /// A run of records in a file.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Block {
     /// Offset in the file.
     pub(super) offset: u64,
@@ -65,13 +66,16 @@ pub(super) struct Block {
     pub(super) crc: Option<u32>,
     /// The file ends before the block does.
     pub(super) cut: bool,
+    /// What the file's index says of it, where that was read.
+    pub(super) indexed: Option<Arc<Indexed>>,
 }
 
 impl Block {
     /// Records that stand in the file as they are, outside of chunks.
     pub(super) fn plain(from: u64, to: u64) -> Self {
         let size = to - from;
-        Self { offset: from, stored: size, size, compression: Compression::None, crc: None, cut: false }
+        let compression = Compression::None;
+        Self { offset: from, stored: size, size, compression, crc: None, cut: false, indexed: None }
     }
 
     /// Whether parts of it can be read by themselves: neither compressed nor under a check sum.
@@ -157,7 +161,9 @@ impl Source for Window<'_> {
     fn get(&mut self, at: u64, len: usize) -> DataResult<Option<&[u8]>> {
         let Some(end) = at.checked_add(len as u64).filter(|end| *end <= self.len) else { return Ok(None) };
         if at < self.window_at || end > self.window_at + self.window.len() as u64 {
-            let bytes = (self.len - at).min(len.max(WINDOW_BYTES) as u64) as usize;
+            // Who fetches from elsewhere chooses how much by himself.
+            let least = if self.file.bytes.is_elsewhere() { 0 } else { WINDOW_BYTES };
+            let bytes = (self.len - at).min(len.max(least) as u64) as usize;
             self.window.resize(bytes, 0);
             self.window_at = at;
             self.file.read_at(self.offset + at, &mut self.window)?;
@@ -181,6 +187,11 @@ pub(super) trait Records: Send + Sync {
         scan: &mut Scan,
         visitor: &mut dyn Visitor,
     ) -> DataResult<()>;
+
+    /// The messages that the index behind a block lists; `None` where that is none.
+    fn listed(&self, _index: &[u8]) -> Option<Vec<Listed>> {
+        None
+    }
 }
 
 /// What records of a file say of later ones: connections of a bag, schemas and channels of an MCAP file.
@@ -198,8 +209,7 @@ type Decompressed = Result<Arc<Vec<u8>>, String>;
 
 /// A file of blocks.
 pub(super) struct BlockFile {
-    file: Mutex<File>,
-    len: u64,
+    pub(super) bytes: Bytes,
     cache: Mutex<Vec<(u32, Arc<OnceLock<Decompressed>>)>>,
     spare: Mutex<Option<Vec<u8>>>,
 }
@@ -207,19 +217,17 @@ pub(super) struct BlockFile {
 impl BlockFile {
     /// Opens the file at `place`; `path` is the one that the user knows.
     pub(super) fn open(path: &Path, place: &Path) -> DataResult<Arc<Self>> {
-        let failed = |e: std::io::Error| DataError::new("cannot be read").at(path).because(e);
-        let file = File::open(place).map_err(failed)?;
-        let len = file.metadata().map_err(failed)?.len();
-        Ok(Arc::new(Self { file: Mutex::new(file), len, cache: Mutex::default(), spare: Mutex::default() }))
+        let bytes = Bytes::open(place).map_err(|e| e.at(path))?;
+        Ok(Arc::new(Self { bytes, cache: Mutex::default(), spare: Mutex::default() }))
     }
 
-    pub(super) fn len(&self) -> u64 {
-        self.len
+    pub(super) const fn len(&self) -> u64 {
+        self.bytes.len()
     }
 
     /// All of the file, through a window.
     pub(super) fn window(&self) -> Window<'_> {
-        self.window_of(0, self.len)
+        self.window_of(0, self.len())
     }
 
     fn window_of(&self, offset: u64, len: u64) -> Window<'_> {
@@ -227,20 +235,11 @@ impl BlockFile {
     }
 
     fn read_at(&self, offset: u64, bytes: &mut [u8]) -> DataResult<()> {
-        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        file.seek(SeekFrom::Start(offset))
-            .and_then(|_| file.read_exact(bytes))
-            .map_err(|e| DataError::new("cannot be read").byte(offset).because(e))
+        self.bytes.read_at(offset, bytes)
     }
 
-    fn read_vec(&self, offset: u64, len: u64) -> DataResult<Vec<u8>> {
-        // Where a block lies inside the file was checked when it was found, so that this is no empty claim.
-        let mut bytes = Vec::with_capacity(len as usize);
-        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        file.seek(SeekFrom::Start(offset))
-            .and_then(|_| (&mut *file).take(len).read_to_end(&mut bytes))
-            .map_err(|e| DataError::new("cannot be read").byte(offset).because(e))?;
-        Ok(bytes)
+    pub(super) fn read_vec(&self, offset: u64, len: u64) -> DataResult<Vec<u8>> {
+        self.bytes.read_vec(offset, len)
     }
 
     /// Reads and decompresses a block into `out`; gives why where that is not everything.
@@ -258,8 +257,16 @@ impl BlockFile {
             Err(e) => return Some(e.to_string()),
         };
         let problem = decompress(block.compression, stored, block.size, block.cut, out);
+        let mut crc = block.crc;
+        if let Some(indexed) = &block.indexed {
+            let mut word = [0; 4];
+            match self.read_at(indexed.crc_at, &mut word) {
+                Ok(()) => crc = Some(u32::from_le_bytes(word)).filter(|crc| *crc != 0),
+                Err(e) => return Some(e.to_string()),
+            }
+        }
         if problem.is_none()
-            && let Some(crc) = block.crc
+            && let Some(crc) = crc
         {
             let found = crc32fast::hash(out);
             if found != crc {
@@ -318,15 +325,16 @@ impl BlockFile {
         let (entry, _) = self.entry(index);
         // Who steps forward will want the next block: it is decompressed while this one is being used.
         let next = blocks.get(index as usize + 1).filter(|next| stepping && !next.is_plain());
-        if let Some(&next) = next.filter(|next| next.size <= READ_AHEAD_BYTES) {
+        if let Some(next) = next.filter(|next| next.size <= READ_AHEAD_BYTES) {
             let (ahead, is_new) = self.entry(index + 1);
             if is_new {
-                let file = Arc::clone(self);
+                let (file, next) = (Arc::clone(self), next.clone());
                 rayon::spawn(move || drop(file.load_into(&ahead, &next)));
             }
         }
-        self.load_into(&entry, block)
-            .map_err(|problem| DataError::new(format!("the chunk {problem}")).byte(block.offset))
+        let loaded = self.load_into(&entry, block);
+        self.bytes.all_had()?;
+        loaded.map_err(|problem| DataError::new(format!("the chunk {problem}")).byte(block.offset))
     }
 
     /// Reads a message.
@@ -352,11 +360,19 @@ impl BlockFile {
         path: &Path,
         scan: &mut Scan,
         visitor: &mut dyn Visitor,
-    ) {
+    ) -> DataResult<()> {
         let mut state = State::default();
         let mut buffers = vec![Vec::new(); rayon::current_num_threads().min(16)];
-        let mut at = 0;
+        let (mut at, mut ahead) = (0, 0);
         while at < blocks.len() {
+            self.bytes.all_had()?;
+            if at >= ahead {
+                ahead = self.look_ahead(blocks, at, records, &state, scan)?;
+            }
+            if self.count_only(&blocks[at], records, &state, scan)? {
+                at += 1;
+                continue;
+            }
             if blocks[at].is_plain() {
                 let block = &blocks[at];
                 let mut source = self.window_of(block.offset, block.stored);
@@ -367,8 +383,10 @@ impl BlockFile {
                 at += 1;
                 continue;
             }
-            let batch = blocks[at..].iter().take_while(|b| !b.is_plain());
-            let batch: Vec<&Block> = batch.take(buffers.len()).collect();
+            let more = blocks[at + 1..ahead]
+                .iter()
+                .take_while(|b| !b.is_plain() && !self.only_counts(b, &state, scan));
+            let batch: Vec<&Block> = [&blocks[at]].into_iter().chain(more).take(buffers.len()).collect();
             let each = batch.par_iter().zip(&mut buffers);
             let problems: Vec<_> = each.map(|(block, buffer)| self.load(block, buffer)).collect();
             for ((block, bytes), problem) in batch.into_iter().zip(&buffers).zip(problems) {
@@ -393,6 +411,7 @@ impl BlockFile {
             let problem = format!("{} messages of unknown topics are left out", state.orphans);
             scan.damaged(&DataError::new(problem).at(path));
         }
+        self.bytes.all_had()
     }
 }
 

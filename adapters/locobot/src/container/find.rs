@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::suspicion::Suspicion;
+use vice_files::elsewhere;
 
 use super::{db3, mcap, ros1, unpack};
 use crate::names::list;
@@ -26,10 +27,16 @@ pub(super) enum Kind {
 
 /// The kind of a file, and whether it is compressed as a whole.
 pub(super) fn kind_of(path: &Path) -> DataResult<(Kind, bool)> {
-    let mut head = Vec::new();
-    File::open(path)
-        .and_then(|f| f.take(16).read_to_end(&mut head))
-        .map_err(|e| DataError::new("cannot be read").because(e))?;
+    let head = match head(path)? {
+        Some(head) => head,
+        None => {
+            let mut head = Vec::new();
+            File::open(path)
+                .and_then(|f| f.take(16).read_to_end(&mut head))
+                .map_err(|e| DataError::new("cannot be read").because(e))?;
+            head
+        }
+    };
     if let Some(kind) = kind_of_head(&head) {
         return Ok((kind, false));
     }
@@ -45,6 +52,19 @@ pub(super) fn kind_of(path: &Path) -> DataResult<(Kind, bool)> {
         true => Err(DataError::new("the file is empty")),
         false => Err(DataError::new("is no ROS 1 bag, MCAP file or sqlite3 data base")),
     }
+}
+
+/// The first bytes of a file that lies elsewhere; `None` where it is here.
+fn head(path: &Path) -> DataResult<Option<Vec<u8>>> {
+    let Some(file) = elsewhere::find(path)? else { return Ok(None) };
+    let mut head = vec![0; file.size_bytes().min(16) as usize];
+    file.read_at(0, &mut head)?;
+    Ok(Some(head))
+}
+
+/// Whether a file is a picture by its name, into which nobody looks for a recording.
+fn is_picture(path: &Path) -> bool {
+    path.extension().is_some_and(|e| ["png", "jpg", "jpeg"].iter().any(|p| e.eq_ignore_ascii_case(p)))
 }
 
 fn kind_of_head(head: &[u8]) -> Option<Kind> {
@@ -85,6 +105,7 @@ struct Information {
 /// [`DataError`] if a `metadata.yaml` cannot be used.
 pub(crate) fn find(path: &Path) -> DataResult<Vec<Found>> {
     if !path.is_dir() {
+        head(path).map(drop)?;
         let parent = path.parent().filter(|p| p.join(METADATA).is_file());
         if !is_recording(path) {
             return Ok(Vec::new());
@@ -94,6 +115,10 @@ pub(crate) fn find(path: &Path) -> DataResult<Vec<Found>> {
         let described = parent.and_then(|folder| described(folder).ok()?.found());
         let compressed_messages = described.is_some_and(|d| d.compressed_messages);
         return Ok(vec![Found { files: vec![path.to_path_buf()], compressed_messages, notes: Vec::new() }]);
+    }
+    for file in entries(path).iter().filter(|file| !is_picture(file)) {
+        // Who cannot be reached now is no other format.
+        head(file).map(drop)?;
     }
     let description = described(path)?;
     if let Description::Of(found) = description {
@@ -132,7 +157,7 @@ pub(crate) fn find(path: &Path) -> DataResult<Vec<Found>> {
 
 /// The recordings of a folder, parts in their order; of one that is there packed and unpacked the latter.
 fn recordings(folder: &Path) -> Vec<PathBuf> {
-    let all = entries(folder).into_iter().filter(|p| p.is_file() && is_recording(p));
+    let all = entries(folder).into_iter().filter(|p| p.is_file() && !is_picture(p) && is_recording(p));
     let mut files: Vec<PathBuf> = all.collect();
     // Sorted by name, the unpacked one comes first.
     files.sort_by_key(|p| (split_name(p), p.clone()));

@@ -4,10 +4,14 @@
 //! one where they are asked for ([`Recording::read`]). The walk does not need the index that a recorder writes when it
 //! is stopped properly, so a recording that was cut off reads like any other, as far as it goes.
 
+mod ahead;
 mod block;
+mod bytes;
 mod db3;
 mod find;
+mod indexed;
 mod mcap;
+mod mcap_index;
 mod ros1;
 mod unpack;
 
@@ -272,5 +276,7 @@ impl Recording {
     }
 }
 
+#[cfg(test)]
+mod elsewhere_tests;
 #[cfg(test)]
 mod tests;

@@ -70,6 +70,7 @@ pub(super) fn open(path: &Path, place: &Path) -> DataResult<Ros1> {
                     compression,
                     crc: None,
                     cut,
+                    indexed: None,
                 });
             }
             _ => {}
@@ -83,6 +84,7 @@ pub(super) fn open(path: &Path, place: &Path) -> DataResult<Ros1> {
         }
         at = end;
     }
+    file.bytes.all_had().map_err(|e| e.at(path))?;
     if unindexed && damage.is_empty() {
         let problem = format!("the bag has no index: it was not closed; read up to byte {}", file.len());
         damage.push(DataError::new(problem).at(path).hint("`rosbag reindex` repairs it"));
@@ -104,8 +106,7 @@ pub(super) fn open(path: &Path, place: &Path) -> DataResult<Ros1> {
 impl Container for Ros1 {
     fn scan(&self, file: u32, scan: &mut Scan, visitor: &mut dyn Visitor) -> DataResult<()> {
         self.damage.iter().for_each(|e| scan.damaged(e));
-        self.file.scan(&self.blocks, &BagRecords, file, &self.path, scan, visitor);
-        Ok(())
+        self.file.scan(&self.blocks, &BagRecords, file, &self.path, scan, visitor)
     }
 
     fn read(&self, locator: &Locator) -> DataResult<Payload> {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use vice_run::files::atomic::Overwrite;
 use vice_run::files::labels::{self, LabelFormat};
+use vice_run::place::Place;
 use vice_run::request::DatasetSpec;
 
 use crate::inputs::PluginArgs;
@@ -52,7 +53,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     };
     // Before the work, so that a wrong name costs nothing.
     LabelFormat::for_writing(&args.output)?;
-    let mut set = labels::read(&args.input, frames.as_ref().map(|(_, _, f)| f.as_ref()))?;
+    let place = Place::of_file(&args.input)?;
+    let read = labels::read(place.path(), frames.as_ref().map(|(_, _, f)| f.as_ref()));
+    let mut set = place.told(read)?;
     if let Some((dataset, camera, _)) = &frames {
         set.dataset.get_or_insert_with(|| dataset.clone());
         set.camera.get_or_insert_with(|| camera.clone());
