@@ -1,7 +1,10 @@
 //! Equidistant (fisheye) distortion, Kannala and Brandt 2006: with `θ = atan(r)`,
 //! `θ' = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)` and `(x', y') = θ'/r (x, y)`.
 
-use super::{Distortion, poly};
+use std::f64::consts::FRAC_PI_2;
+
+use super::seed::Seed;
+use super::{Distortion, poly, solve};
 use crate::lanes::Number;
 
 /// Equidistant coefficients.
@@ -53,15 +56,38 @@ impl Distortion for Equidistant {
         ((x * scale, y * scale), [scale + x * x * slope, cross, cross, scale + y * y * slope])
     }
 
+    /// In one dimension: the angle off the axis alone is solved for.
+    #[inline(always)]
+    fn undistort_fast<N: Number>(&self, seed: &Seed, quick_radius: f64, (xd, yd): (N, N)) -> (N, N, N::Mask) {
+        let rd2 = xd * xd + yd * yd;
+        let rd = rd2.sqrt();
+        let mut theta = rd * solve::seeded(seed, rd2);
+        theta = theta - (self.angle(theta) - rd) / self.angle_rate(theta);
+        let step = (self.angle(theta) - rd) / self.angle_rate(theta);
+        theta = theta - step;
+        let r = theta.tan();
+        let scale = N::select(rd.at_most(rd.of(NEAR_AXIS)), rd.of(1.0), r / rd);
+        let settled =
+            rd.both(rd2.at_most(rd.of(seed.max_rd2)), (step * step).at_most(rd.of(solve::LAST_STEP_SQUARED)));
+        let inside = rd.both(theta.below(rd.of(FRAC_PI_2)), r.at_most(rd.of(quick_radius)));
+        (xd * scale, yd * scale, rd.both(settled, inside))
+    }
+
+    /// For the angle, which grows with the distorted radius.
+    fn seed(&self, reach: f64) -> Seed {
+        let rim = self.max_radius().atan();
+        Seed::fit(|theta| self.angle(theta), rim, reach.min(self.angle(rim)))
+    }
+
     fn max_radius(&self) -> f64 {
         let growth = [1.0, 3.0 * self.k1, 5.0 * self.k2, 7.0 * self.k3, 9.0 * self.k4];
         match poly::first_sign_change(&growth).map(f64::sqrt) {
-            Some(theta) if theta < std::f64::consts::FRAC_PI_2 => theta.tan(),
+            Some(theta) if theta < FRAC_PI_2 => theta.tan(),
             _ => f64::INFINITY,
         }
     }
 
     fn radial(&self, r: f64) -> f64 {
-        self.angle(r.atan())
+        self.angle(Number::atan(r))
     }
 }

@@ -21,11 +21,13 @@ mod equidistant;
 mod poly;
 mod radtan;
 mod rational;
+mod seed;
 mod solve;
 
 use nalgebra::{Point3, Vector3};
 
 use crate::lanes::Number;
+use seed::Seed;
 
 pub(crate) use batch::{Bound, Pinhole, Track, with_lens};
 pub use equidistant::Equidistant;
@@ -34,6 +36,9 @@ pub use rational::Rational;
 
 /// How closely [`Camera::unproject`] solves, in normalised coordinates.
 pub const UNPROJECT_TOLERANCE: f64 = 1e-10;
+
+/// The seed is fitted up to this many times the distance of the farthest corner: a label may lie a little outside.
+const REACH: f64 = 1.03;
 
 /// A place in the image, in pixels; pixel centres are integers.
 ///
@@ -100,6 +105,26 @@ pub(crate) trait Distortion: Copy + Send + Sync {
     fn distort<N: Number>(&self, x: N, y: N) -> (N, N);
     /// The same, with the Jacobian `[dx'/dx, dx'/dy, dy'/dx, dy'/dy]`.
     fn distort_with_jacobian<N: Number>(&self, x: N, y: N) -> ((N, N), [N; 4]);
+    /// What is not radial: the part of `distort` that is beside the direction of `(x, y)`.
+    #[inline(always)]
+    fn tangential<N: Number>(&self, x: N, _: N) -> (N, N) {
+        (x.of(0.0), x.of(0.0))
+    }
+    /// A fixed number of steps to the coordinates whose distortion is `(xd, yd)`, and whether they were enough and led to
+    /// a radius below `quick_radius`.
+    #[inline(always)]
+    fn undistort_fast<N: Number>(
+        &self,
+        seed: &Seed,
+        quick_radius: f64,
+        distorted: (N, N),
+    ) -> (N, N, N::Mask) {
+        solve::in_the_plane(self, seed, quick_radius, distorted)
+    }
+    /// What makes a good start for distorted radii up to `reach`.
+    fn seed(&self, reach: f64) -> Seed {
+        Seed::fit(|r| self.radial(r), self.max_radius(), reach)
+    }
     /// Undistorted radius up to which the radial part grows; infinity where it always does.
     fn max_radius(&self) -> f64;
     /// Distorted radius of an undistorted one, without the tangential part.
@@ -198,6 +223,7 @@ pub struct Camera {
     cy: f64,
     model: Model,
     max_radius: f64,
+    seed: Seed,
 }
 
 impl Model {
@@ -296,13 +322,16 @@ impl Camera {
         if !model.coefficients().iter().all(|c| c.is_finite()) {
             return Err(CameraError::NotFinite("distortion coefficient"));
         }
-        let max_radius = match &model {
-            Model::Pinhole => f64::INFINITY,
-            Model::Radtan(m) => m.max_radius(),
-            Model::Rational(m) => m.max_radius(),
-            Model::Equidistant(m) => m.max_radius(),
+        // The farthest corner of the image, and a little beyond.
+        let side = |n: u32, f: f64, c: f64| REACH * (c.abs() + 1.0).max((f64::from(n) - c).abs()) / f;
+        let reach = [side(width, fx, cx), side(height, fy, cy)];
+        let (max_radius, seed) = match &model {
+            Model::Pinhole => (f64::INFINITY, Seed::NONE),
+            Model::Radtan(m) => (m.max_radius(), solve::seed_of(m, reach)),
+            Model::Rational(m) => (m.max_radius(), solve::seed_of(m, reach)),
+            Model::Equidistant(m) => (m.max_radius(), solve::seed_of(m, reach)),
         };
-        Ok(Self { width, height, fx, fy, cx, cy, model, max_radius })
+        Ok(Self { width, height, fx, fy, cx, cy, model, max_radius, seed })
     }
 
     /// Columns.
@@ -368,15 +397,15 @@ impl Camera {
     /// # Errors
     /// [`UnprojectError`] if no ray within the valid radius reaches the pixel or the solver does not converge.
     pub fn unproject(&self, px: Pixel) -> Result<Vector3<f64>, UnprojectError> {
-        let (xd, yd) = ((px.u - self.cx) / self.fx, (px.v - self.cy) / self.fy);
+        let (xd, yd) = ((px.u - self.cx) * (1.0 / self.fx), (px.v - self.cy) * (1.0 / self.fy));
         if !(xd.is_finite() && yd.is_finite()) {
             return Err(UnprojectError::OutsideModel);
         }
         let (x, y) = match &self.model {
             Model::Pinhole => (xd, yd),
-            Model::Radtan(m) => solve::undistort(m, self.max_radius, xd, yd)?,
-            Model::Rational(m) => solve::undistort(m, self.max_radius, xd, yd)?,
-            Model::Equidistant(m) => solve::undistort(m, self.max_radius, xd, yd)?,
+            Model::Radtan(m) => solve::undistort(m, &self.seed, self.max_radius, (xd, yd))?,
+            Model::Rational(m) => solve::undistort(m, &self.seed, self.max_radius, (xd, yd))?,
+            Model::Equidistant(m) => solve::undistort(m, &self.seed, self.max_radius, (xd, yd))?,
         };
         Ok(Vector3::new(x, y, 1.0))
     }

@@ -21,15 +21,20 @@ impl Distortion for Radtan {
         let (xx, yy, xy) = (x * x, y * y, x * y);
         let s = xx + yy;
         let d = s * (s * (s * self.k3 + self.k2) + self.k1) + 1.0;
-        tangential(x, y, d, s, xx, yy, xy, self.p1, self.p2)
+        brown(x, y, d, s, xx, yy, xy, self.p1, self.p2)
+    }
+
+    #[inline(always)]
+    fn tangential<N: Number>(&self, x: N, y: N) -> (N, N) {
+        brown_tangential(x, y, self.p1, self.p2)
     }
 
     #[inline(always)]
     fn distort_with_jacobian<N: Number>(&self, x: N, y: N) -> ((N, N), [N; 4]) {
         let s = x * x + y * y;
         let d = s * (s * (s * self.k3 + self.k2) + self.k1) + 1.0;
-        let d_ds = s * (s * (3.0 * self.k3) + 2.0 * self.k2) + self.k1;
-        brown_with_jacobian(x, y, d, d_ds, self.p1, self.p2)
+        let twice_d_ds = s * (s * (6.0 * self.k3) + 4.0 * self.k2) + 2.0 * self.k1;
+        brown_with_jacobian(x, y, d, twice_d_ds, self.p1, self.p2)
     }
 
     fn max_radius(&self) -> f64 {
@@ -45,28 +50,36 @@ impl Distortion for Radtan {
 
 #[expect(clippy::too_many_arguments, reason = "products that both callers already have")]
 #[inline(always)]
-pub(super) fn tangential<N: Number>(x: N, y: N, d: N, s: N, xx: N, yy: N, xy: N, p1: f64, p2: f64) -> (N, N) {
+pub(super) fn brown<N: Number>(x: N, y: N, d: N, s: N, xx: N, yy: N, xy: N, p1: f64, p2: f64) -> (N, N) {
     (x * d + xy * (2.0 * p1) + (s + xx * 2.0) * p2, y * d + (s + yy * 2.0) * p1 + xy * (2.0 * p2))
 }
 
-/// Brown's form for any radial factor `d(s)` with derivative `d_ds`, `s = r²`.
+/// The tangential part of Brown's form.
+#[inline(always)]
+pub(super) fn brown_tangential<N: Number>(x: N, y: N, p1: f64, p2: f64) -> (N, N) {
+    let (xx, yy, xy) = (x * x, y * y, x * y);
+    let s = xx + yy;
+    (xy * (2.0 * p1) + (s + xx * 2.0) * p2, (s + yy * 2.0) * p1 + xy * (2.0 * p2))
+}
+
+/// Brown's form for any radial factor `d(s)` with twice its derivative, `s = r²`.
 #[inline(always)]
 pub(super) fn brown_with_jacobian<N: Number>(
     x: N,
     y: N,
     d: N,
-    d_ds: N,
+    twice_d_ds: N,
     p1: f64,
     p2: f64,
 ) -> ((N, N), [N; 4]) {
     let (xx, yy, xy) = (x * x, y * y, x * y);
-    let distorted = tangential(x, y, d, xx + yy, xx, yy, xy, p1, p2);
-    let cross = xy * 2.0 * d_ds + x * (2.0 * p1) + y * (2.0 * p2);
+    let distorted = brown(x, y, d, xx + yy, xx, yy, xy, p1, p2);
+    let cross = xy * twice_d_ds + (x * (2.0 * p1) + y * (2.0 * p2));
     let jacobian = [
-        d + xx * 2.0 * d_ds + y * (2.0 * p1) + x * (6.0 * p2),
+        d + xx * twice_d_ds + (y * (2.0 * p1) + x * (6.0 * p2)),
         cross,
         cross,
-        d + yy * 2.0 * d_ds + y * (6.0 * p1) + x * (2.0 * p2),
+        d + yy * twice_d_ds + (y * (6.0 * p1) + x * (2.0 * p2)),
     ];
     (distorted, jacobian)
 }

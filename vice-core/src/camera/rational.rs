@@ -22,7 +22,8 @@ impl Rational {
     #[inline(always)]
     fn factor<N: Number>(&self, s: N) -> N {
         let n = s * (s * (s * self.k3 + self.k2) + self.k1) + 1.0;
-        n / (s * (s * (s * self.k6 + self.k5) + self.k4) + 1.0)
+        // As the Jacobian has it, so that both say the same bits.
+        n * (s.of(1.0) / (s * (s * (s * self.k6 + self.k5) + self.k4) + 1.0))
     }
 }
 
@@ -31,7 +32,12 @@ impl Distortion for Rational {
     fn distort<N: Number>(&self, x: N, y: N) -> (N, N) {
         let (xx, yy, xy) = (x * x, y * y, x * y);
         let s = xx + yy;
-        radtan::tangential(x, y, self.factor(s), s, xx, yy, xy, self.p1, self.p2)
+        radtan::brown(x, y, self.factor(s), s, xx, yy, xy, self.p1, self.p2)
+    }
+
+    #[inline(always)]
+    fn tangential<N: Number>(&self, x: N, y: N) -> (N, N) {
+        radtan::brown_tangential(x, y, self.p1, self.p2)
     }
 
     #[inline(always)]
@@ -39,9 +45,11 @@ impl Distortion for Rational {
         let s = x * x + y * y;
         let n = s * (s * (s * self.k3 + self.k2) + self.k1) + 1.0;
         let m = s * (s * (s * self.k6 + self.k5) + self.k4) + 1.0;
-        let n_ds = s * (s * (3.0 * self.k3) + 2.0 * self.k2) + self.k1;
-        let m_ds = s * (s * (3.0 * self.k6) + 2.0 * self.k5) + self.k4;
-        radtan::brown_with_jacobian(x, y, n / m, (n_ds * m - n * m_ds) / (m * m), self.p1, self.p2)
+        let n_ds = s * (s * (6.0 * self.k3) + 4.0 * self.k2) + 2.0 * self.k1;
+        let m_ds = s * (s * (6.0 * self.k6) + 4.0 * self.k5) + 2.0 * self.k4;
+        let per_m = x.of(1.0) / m;
+        let d = n * per_m;
+        radtan::brown_with_jacobian(x, y, d, (n_ds - d * m_ds) * per_m, self.p1, self.p2)
     }
 
     fn max_radius(&self) -> f64 {

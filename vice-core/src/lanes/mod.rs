@@ -13,6 +13,7 @@ mod atan;
 mod drive;
 mod element;
 mod number;
+mod tan;
 
 pub(crate) use drive::{Kernel, Masked, run};
 pub use element::Element;

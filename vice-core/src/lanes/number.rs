@@ -23,13 +23,14 @@ pub(crate) trait Number:
     fn abs(self) -> Self;
     /// The arc tangent of a number that is not negative.
     fn atan(self) -> Self;
+    /// The tangent of an angle from 0 to below a right one, radians.
+    fn tan(self) -> Self;
     /// `self <= other`; no where one is NaN.
     fn at_most(self, other: Self) -> Self::Mask;
     /// `self < other`; no where one is NaN.
     fn below(self, other: Self) -> Self::Mask;
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     fn both(self, a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    fn either(self, a: Self::Mask, b: Self::Mask) -> Self::Mask;
 }
 
 impl Number for f64 {
@@ -48,7 +49,12 @@ impl Number for f64 {
     }
     #[inline(always)]
     fn atan(self) -> Self {
-        self.atan()
+        // Not the standard library's: one point and many have the same bits.
+        super::atan::atan(self)
+    }
+    #[inline(always)]
+    fn tan(self) -> Self {
+        super::tan::tan(self)
     }
     #[inline(always)]
     fn at_most(self, other: Self) -> bool {
@@ -65,10 +71,6 @@ impl Number for f64 {
     #[inline(always)]
     fn both(self, a: bool, b: bool) -> bool {
         a & b
-    }
-    #[inline(always)]
-    fn either(self, a: bool, b: bool) -> bool {
-        a | b
     }
 }
 
@@ -100,6 +102,10 @@ impl<S: Simd> Number for Lanes<S> {
         super::atan::atan(self)
     }
     #[inline(always)]
+    fn tan(self) -> Self {
+        super::tan::tan(self)
+    }
+    #[inline(always)]
     fn at_most(self, other: Self) -> S::m64s {
         self.simd.less_than_or_equal_f64s(self.v, other.v)
     }
@@ -114,10 +120,6 @@ impl<S: Simd> Number for Lanes<S> {
     #[inline(always)]
     fn both(self, a: S::m64s, b: S::m64s) -> S::m64s {
         self.simd.and_m64s(a, b)
-    }
-    #[inline(always)]
-    fn either(self, a: S::m64s, b: S::m64s) -> S::m64s {
-        self.simd.or_m64s(a, b)
     }
 }
 

@@ -34,6 +34,34 @@ fn the_arc_tangent_is_that_of_the_standard_library() {
     assert!(nan[0].is_nan());
 }
 
+struct Tan<'a>(&'a [f64], &'a mut [f64]);
+
+impl WithSimd for Tan<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        for (from, to) in self.0.chunks(S::F64_LANES).zip(self.1.chunks_mut(S::F64_LANES)) {
+            Lanes::load(simd, from).tan().store(to);
+        }
+    }
+}
+
+#[test]
+fn the_tangent_is_that_of_the_standard_library_and_of_one_number() {
+    let right = std::f64::consts::FRAC_PI_2;
+    let mut angles =
+        vec![0.0, f64::MIN_POSITIVE, right / 2.0, right / 2.0 + 1e-16, right - 1e-9, right - 1e-15];
+    angles.extend((0..200_000).map(|i| f64::from(i) * right / 200_000.0));
+    let mut found = vec![0.0; angles.len()];
+    ARCH.dispatch(Tan(&angles, &mut found));
+    for (angle, found) in angles.iter().zip(&found) {
+        assert_eq!(found.to_bits(), Number::tan(*angle).to_bits(), "{angle}");
+        let expected = angle.tan();
+        let error = (found - expected).abs();
+        assert!(error <= 6.0 * f64::EPSILON * expected, "tan({angle}) = {found}, not {expected}");
+    }
+}
+
 /// Doubles what is not negative.
 #[derive(Clone, Copy)]
 struct Double;

@@ -9,14 +9,6 @@ use super::{Camera, Motion};
 use crate::camera::{Distortion, Pixel};
 use crate::lanes::{Kernel, Lanes, Masked, Number};
 
-/// Steps of Newton's method for a register of points; the single-point function decides what needs more.
-const LANE_STEPS: usize = 10;
-/// Beyond this part of the valid radius the single-point function decides: at the rim the Jacobian is singular, and
-/// what is left of the last bits depends on the order of operations.
-const NEAR_RIM: f64 = 0.999;
-/// The same where a lens has no rim: a ray so nearly at right angles to the axis is one of a pixel that none reaches.
-const GRAZING: f64 = 1e4;
-
 /// No distortion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pinhole;
@@ -50,12 +42,16 @@ pub(crate) struct Bound<D> {
     lens: D,
     /// What the squared radius is compared with: infinite ones are outside too.
     max_r2: f64,
+    per_fx_fy: [f64; 2],
+    quick_radius: f64,
 }
 
 impl<D: Distortion> Bound<D> {
     pub(crate) fn new(camera: &Camera, lens: D) -> Self {
         let max_r2 = (camera.max_radius * camera.max_radius).min(f64::MAX);
-        Self { camera: *camera, lens, max_r2 }
+        let per_fx_fy = [1.0 / camera.fx, 1.0 / camera.fy];
+        let quick_radius = solve::quick_radius(camera.max_radius);
+        Self { camera: *camera, lens, max_r2, per_fx_fy, quick_radius }
     }
 
     /// Pixel, and whether there is one.
@@ -72,26 +68,14 @@ impl<D: Distortion> Bound<D> {
     #[inline(always)]
     fn unproject<S: Simd>(&self, [u, v]: [Lanes<S>; 2]) -> ([Lanes<S>; 2], S::m64s, S::m64s) {
         let c = &self.camera;
-        let (xd, yd) = ((u - c.cx) / u.of(c.fx), (v - c.cy) / v.of(c.fy));
-        let largest = u.of(f64::MAX);
-        let finite = u.both(xd.abs().at_most(largest), yd.abs().at_most(largest));
+        let (xd, yd) = ((u - c.cx) * self.per_fx_fy[0], (v - c.cy) * self.per_fx_fy[1]);
         if !D::DISTORTS {
+            let largest = u.of(f64::MAX);
+            let finite = u.both(xd.abs().at_most(largest), yd.abs().at_most(largest));
             return ([xd, yd], finite, u.of(1.0).below(u.of(0.0)));
         }
-        let (mut x, mut y, mut step) = (xd, yd, u.of(f64::INFINITY));
-        // A pixel that is not finite is done, and not valid.
-        let mut done = u.negated(finite);
-        let mut steps = 0;
-        while steps < LANE_STEPS && u.any(u.negated(done)) {
-            steps += 1;
-            let (next_x, next_y, next_step) = solve::newton_step(&self.lens, (xd, yd), (x, y));
-            (x, y) = (Lanes::select(done, x, next_x), Lanes::select(done, y, next_y));
-            done = u.either(done, solve::settled(next_step, step, x, y));
-            step = next_step;
-        }
-        let inside = (x * x + y * y).sqrt().at_most(u.of((c.max_radius * NEAR_RIM).min(GRAZING)));
-        let found = u.both(done, inside);
-        (([x, y]), u.both(finite, found), u.both(finite, u.negated(found)))
+        let (x, y, found) = self.lens.undistort_fast(&c.seed, self.quick_radius, (xd, yd));
+        ([x, y], found, u.negated(found))
     }
 }
 
