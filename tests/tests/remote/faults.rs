@@ -63,6 +63,8 @@ fn what_does_not_pass_is_one_line_in_bounded_time() {
     server.behave(|b| b.delay = Duration::ZERO);
     let line = error(&desk, &["info", &server.url("no.mcap")]);
     assert!(line.contains("no.mcap: no such object"), "{line}");
+    let line = error(&desk, &["info", &server.url("folder/")]);
+    assert!(line.contains("folder/: a web server does not say what is in a folder"), "{line}");
 }
 
 #[test]
