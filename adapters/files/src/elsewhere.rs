@@ -116,6 +116,9 @@ impl Read for Reader {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         let left = self.file.size_bytes().saturating_sub(self.at);
         let len = bytes.len().min(usize::try_from(left).unwrap_or(usize::MAX));
+        if len == 0 {
+            return Ok(0);
+        }
         self.file.read_at(self.at, &mut bytes[..len]).map_err(io::Error::other)?;
         self.at += len as u64;
         Ok(len)

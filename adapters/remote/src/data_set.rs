@@ -129,6 +129,12 @@ fn found(address: &str) -> DataResult<Found> {
     let client = Client::new(address)?;
     wait(async move {
         let is_folder = client.shown.ends_with('/') || client.path.as_ref().is_empty();
+        if !client.lists && client.shown.ends_with('/') {
+            let problem = "a web server does not say what is in a folder";
+            return Err(DataError::of_kind(ErrorKind::Unsupported, problem)
+                .at(&client.shown)
+                .hint("name a recording, or a folder in a bucket by `s3://` or `gs://`"));
+        }
         if !client.lists || !is_folder {
             match Object::at(client.clone()).await {
                 Ok(object) => return Ok(Found::one(object)),

@@ -77,6 +77,33 @@ fn a_folder_is_staged_without_its_images_which_are_fetched_where_they_are_read()
 }
 
 #[test]
+fn a_flight_brings_what_lies_above_it_and_its_films_only_for_pictures() {
+    let (Some(desk), Some(data)) = (desk(), vice_tests::shared("data/blackbird")) else { return };
+    put(&data, "c/blackbird");
+    let (below, labels) = ("picasso/yawForward/maxSpeed1p0", "labels.csv");
+    let (near, far) = (data.to_string_lossy().into_owned(), "s3://flights/c/blackbird");
+    let more = ["--estimate", "imu-euler", "--depth", "floor,zcam"];
+    let here = desk.evaluated(&format!("{near}/{below}"), &format!("{near}/{labels}"), &more);
+    let there = desk.evaluated(&format!("{far}/{below}"), &format!("{far}/{labels}"), &more);
+    assert_eq!(there.to_string().replace(far, &near), here.to_string());
+    let sizes = |ending: &str| {
+        let files = walk(&desk.path("cache")).into_iter().filter(|(name, _)| name.ends_with(ending));
+        files.map(|(_, bytes)| bytes).collect::<Vec<_>>()
+    };
+    assert_eq!(sizes("/trajectoryOffsets.yaml").len(), 1, "it lies three folders above");
+    assert_eq!(sizes(".mov"), [0, 0], "their indices were read where they are");
+    if Command::new("ffmpeg").arg("-version").output().is_err() {
+        eprintln!("skipped: without FFmpeg there are no pictures of a film");
+        return;
+    }
+    let page = ["--report", "page.html", more[0], more[1]];
+    desk.evaluated(&format!("{far}/{below}"), &format!("{far}/{labels}"), &page);
+    let mut films = sizes(".mov");
+    films.sort_unstable();
+    assert!(films[0] == 0 && films[1] > 0, "the one whose pictures are shown: {films:?}");
+}
+
+#[test]
 fn what_is_not_in_a_bucket_is_said() {
     let Some(desk) = desk() else { return };
     let run = desk.vice(&["info", "s3://flights/no/such"]);

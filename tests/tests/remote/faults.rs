@@ -63,6 +63,8 @@ fn what_does_not_pass_is_one_line_in_bounded_time() {
     server.behave(|b| b.delay = Duration::ZERO);
     let line = error(&desk, &["info", &server.url("no.mcap")]);
     assert!(line.contains("no.mcap: no such object"), "{line}");
+    let line = error(&desk, &["info", &server.url("folder/")]);
+    assert!(line.contains("folder/: a web server does not say what is in a folder"), "{line}");
 }
 
 #[test]
@@ -122,13 +124,14 @@ fn secrets_are_used_and_never_shown() {
     assert!(error(&desk, &args).contains("may not be read"));
     let (recording, labels) = (secret(&recording), secret(&labels));
     let mut args = evaluate(&recording, &labels);
-    args.extend(["--json", "out.json", "--report", "out.html", "-v"]);
+    args.extend(["--json", "out.json", "--report", "out.html", "-vv"]);
     let run = desk.vice(&args);
     assert_eq!(run.code, 0, "{}", run.stderr);
     let mut texts = vec![run.stdout, run.stderr];
     texts.extend(["out.json", "out.html"].map(|name| std::fs::read_to_string(desk.path(name)).unwrap()));
     server.behave(|b| b.refuse = 10_000);
     texts.push(error(&desk, &evaluate(&recording, &labels)));
+    texts.push(desk.vice(&["info", &recording, "-vv"]).stderr);
     server.behave(|b| b.refuse = 0);
     let manifest = format!("dataset,labels,estimate,depth-check\n{recording},{labels},slam,off\n");
     std::fs::write(desk.path("m.csv"), manifest).unwrap();
