@@ -229,7 +229,8 @@ impl Fitter<'_> {
 }
 
 fn length(v: [f64; 2]) -> f64 {
-    v[0].hypot(v[1])
+    // Pixels: their squares neither overflow nor vanish, and `hypot` takes ten times as long.
+    (v[0] * v[0] + v[1] * v[1]).sqrt()
 }
 
 #[cfg(test)]

@@ -66,7 +66,9 @@ impl Pixel {
 
     /// Euclidean distance in pixels.
     pub fn distance_px(self, other: Self) -> f64 {
-        (self.u - other.u).hypot(self.v - other.v)
+        let (du, dv) = (self.u - other.u, self.v - other.v);
+        // As `hypot` to the last bit or two, and ten times as fast; no two places are 1e150 pixels apart.
+        (du * du + dv * dv).sqrt()
     }
 }
 

@@ -11,6 +11,8 @@ use crate::track::lift;
 
 /// How far two sources' depths may be apart: a share of the depth, and metres.
 const SAME_DEPTH: (f64, f64) = (0.05, 0.05);
+/// A depth is judged by so many views of a segment at most, evenly spaced: more of them show the same again.
+const MOST_VIEWS: usize = 250;
 /// So many points are named in a sentence.
 const NAMED: usize = 8;
 
@@ -52,7 +54,8 @@ pub(super) fn depth_doubts(
         }
         let Ok(point_camera_m) = lift(scorer.evaluation.camera, label.px, depth.z_m) else { continue };
         let Ok(at_keyframe) = scorer.world_from_camera(segment.keyframe.frame) else { continue };
-        let views = segment.samples.iter().filter_map(|s| {
+        let every = segment.samples.len().div_ceil(MOST_VIEWS).max(1);
+        let views = segment.samples.iter().step_by(every).filter_map(|s| {
             let now = scorer.world_from_camera(s.frame).ok()?;
             Some((now.inverse() * at_keyframe, s.observation.px))
         });

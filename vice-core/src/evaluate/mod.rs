@@ -212,12 +212,9 @@ fn run(
                 None => None,
             };
             let scorer = Scorer {
-                evaluation,
-                cameras: &cameras,
-                poses,
-                depths: known[place].of(index),
                 keep_samples: evaluation.keep_samples || to_sink.is_some(),
                 carries: true,
+                ..Scorer::new(evaluation, &cameras, poses, known[place].of(index))
             };
             let scored = score::score(&scorer, to_sink).map_err(EvaluateError::Samples)?;
             let rmse_px = subset_rmse_px(&scored.errors, &sizes);

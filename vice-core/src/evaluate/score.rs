@@ -3,15 +3,16 @@
 use crate::parallel::*;
 use nalgebra::Point3;
 
-use super::select::{Matched, SelectedPoint, SelectedSegment};
+use super::select::{SelectedPoint, SelectedSegment};
 use super::streams::PosesAtFrames;
 use super::{DepthTable, Evaluation, SkipReason, pixel_key, position, skip};
 use crate::camera::Pixel;
-use crate::frames::{self, BodyFromCamera, Rigid, WorldFromCamera};
+use crate::frames::{self, BodyFromCamera, Rigid, WorldFromBody, WorldFromCamera};
 use crate::metrics::held::{Carried, CarriedSegment};
 use crate::metrics::pixel::SquaredErrors;
 use crate::result::{KeyframePart, PointName, Sample, Skip};
-use crate::track::{lift, track};
+use crate::track::lift;
+use crate::trajectory::NoPose;
 
 /// What was scored of all points, in their order and in time.
 #[derive(Default)]
@@ -66,8 +67,8 @@ pub(super) fn score(scorer: &Scorer<'_>, mut sink: Option<TakePoint<'_>>) -> std
 /// What one stream with one depth source is scored with.
 pub(super) struct Scorer<'a> {
     pub(super) evaluation: &'a Evaluation<'a>,
-    pub(super) cameras: &'a [Option<BodyFromCamera>],
-    pub(super) poses: &'a PosesAtFrames,
+    /// Where the camera is at each selected frame.
+    pub(super) placed: Vec<Result<WorldFromCamera, SkipReason>>,
     pub(super) depths: &'a DepthTable,
     /// Whether samples are listed, or handed on.
     pub(super) keep_samples: bool,
@@ -75,7 +76,22 @@ pub(super) struct Scorer<'a> {
     pub(super) carries: bool,
 }
 
-impl Scorer<'_> {
+impl<'a> Scorer<'a> {
+    /// Lists no samples and keeps no residuals, unless told otherwise.
+    pub(super) fn new(
+        evaluation: &'a Evaluation<'a>,
+        cameras: &[Option<BodyFromCamera>],
+        poses: &PosesAtFrames,
+        depths: &'a DepthTable,
+    ) -> Self {
+        let place = |(pose, camera): (&Result<WorldFromBody, NoPose>, &Option<BodyFromCamera>)| {
+            let world_from_body = pose.map_err(SkipReason::of_frame)?;
+            Ok(world_from_body * camera.ok_or(SkipReason::NoExtrinsics)?)
+        };
+        let placed = poses.iter().zip(cameras).map(place).collect();
+        Self { evaluation, placed, depths, keep_samples: false, carries: false }
+    }
+
     fn point(&self, place: usize, point: &SelectedPoint<'_>) -> ScoredPoint {
         let name = PointName(point.name.clone());
         let mut scored = ScoredPoint::default();
@@ -115,20 +131,25 @@ impl Scorer<'_> {
             point_world_m: Some(at_keyframe.transform_point(&point_camera_m).coords.into()),
             on_edge: depth.on_edge,
         });
-        let mut carried =
-            CarriedSegment { point: place, keyframe: self.at(keyframe.frame), samples: Vec::new() };
+        let mut at = self.at(keyframe.frame);
+        let mut carried = CarriedSegment { point: place, keyframe: frame_u32(at), samples: Vec::new() };
         for sample in &segment.samples {
             let label = sample.observation;
-            let tracked = self.world_from_camera(sample.frame).and_then(|now| {
-                track(camera, &at_keyframe, &now, &point_camera_m).map_err(SkipReason::of_projection)
+            at = self.at_or_after(at, sample.frame);
+            let point_m = self.placed[at].map(|now| {
+                let now_from_keyframe: Rigid<frames::Camera, frames::Camera> = now.inverse() * at_keyframe;
+                now_from_keyframe.transform_point(&point_camera_m)
+            });
+            let tracked = point_m.and_then(|point_m| {
+                let tracked_px = camera.project(&point_m).map_err(SkipReason::of_projection)?;
+                Ok((point_m, tracked_px))
             });
             match tracked {
-                Ok(tracked_px) => {
+                Ok((point_m, tracked_px)) => {
                     let error_px = tracked_px.distance_px(label.px);
                     scored.errors.add(error_px);
                     if self.carries {
-                        let motion = (&at_keyframe, sample.frame);
-                        carried.samples.push(self.carried(sample, motion, &point_camera_m, tracked_px));
+                        carried.samples.push(self.carried(label.px, at, &point_m, tracked_px));
                     }
                     if self.keep_samples {
                         scored.samples.push(Sample {
@@ -149,24 +170,17 @@ impl Scorer<'_> {
         Ok(())
     }
 
-    /// The residual of a sample, in pixels, as an angle, and at its depth.
-    fn carried(
-        &self,
-        sample: &Matched<'_>,
-        (at_keyframe, frame): (&WorldFromCamera, usize),
-        point_camera_m: &Point3<f64>,
-        tracked_px: Pixel,
-    ) -> Carried {
-        let label = sample.observation.px;
+    /// The residual of a sample, in pixels, as an angle, and at its depth. `point_m` is the carried point in the camera
+    /// frame of the label.
+    fn carried(&self, label: Pixel, at: usize, point_m: &Point3<f64>, tracked_px: Pixel) -> Carried {
         let mut carried = Carried {
-            frame: self.at(frame),
+            frame: frame_u32(at),
             residual_px: [tracked_px.u - label.u, tracked_px.v - label.v],
             angle_rad: f32::NAN,
             offset_m: f32::NAN,
         };
-        if let (Ok(now), Ok(ray)) = (self.world_from_camera(frame), self.evaluation.camera.unproject(label)) {
-            let now_from_keyframe: Rigid<frames::Camera, frames::Camera> = now.inverse() * *at_keyframe;
-            let point_m = now_from_keyframe.transform_point(point_camera_m).coords;
+        if let Ok(ray) = self.evaluation.camera.unproject(label) {
+            let point_m = point_m.coords;
             carried.angle_rad = point_m.cross(&ray).norm().atan2(point_m.dot(&ray)) as f32;
             carried.offset_m = (point_m - point_m.z * ray).norm() as f32;
         }
@@ -174,14 +188,22 @@ impl Scorer<'_> {
     }
 
     /// Place of a frame among the selected ones.
-    fn at(&self, frame: usize) -> u32 {
-        u32::try_from(position(&self.evaluation.selection.frames, frame)).unwrap_or(u32::MAX)
+    fn at(&self, frame: usize) -> usize {
+        position(&self.evaluation.selection.frames, frame)
+    }
+
+    /// The same from the place of a frame that is most often the one before.
+    fn at_or_after(&self, before: usize, frame: usize) -> usize {
+        let next = before + 1;
+        if self.evaluation.selection.frames.get(next) == Some(&frame) { next } else { self.at(frame) }
     }
 
     pub(super) fn world_from_camera(&self, frame: usize) -> Result<WorldFromCamera, SkipReason> {
-        let at = position(&self.evaluation.selection.frames, frame);
-        let world_from_body = self.poses[at].map_err(SkipReason::of_frame)?;
-        let body_from_camera = self.cameras[at].ok_or(SkipReason::NoExtrinsics)?;
-        Ok(world_from_body * body_from_camera)
+        self.placed[self.at(frame)]
     }
+}
+
+/// A place as residuals keep it.
+fn frame_u32(at: usize) -> u32 {
+    u32::try_from(at).unwrap_or(u32::MAX)
 }

@@ -172,7 +172,8 @@ impl<'a> Columns<'a> {
     }
 }
 
-#[cfg(all(test, feature = "parquet"))]
+#[cfg(test)]
+#[cfg(feature = "parquet")]
 mod tests {
     use super::*;
     use crate::report::testing::{document, part, sample};

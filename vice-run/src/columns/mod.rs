@@ -54,7 +54,8 @@ mod without;
 #[cfg(not(feature = "parquet"))]
 pub(crate) use without::{read, write};
 
-#[cfg(all(test, feature = "parquet"))]
+#[cfg(test)]
+#[cfg(feature = "parquet")]
 mod tests {
     use super::*;
     use proptest::prelude::*;
