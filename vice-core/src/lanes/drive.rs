@@ -2,6 +2,7 @@
 
 use pulp::{Simd, WithSimd, bytemuck};
 
+use super::number::{REGISTERS, Yes};
 use super::{ARCH, Element, Lanes, Number};
 
 /// Points below which one thread is faster: waking another costs some ten microseconds.
@@ -28,9 +29,9 @@ pub(crate) struct Masked<S: Simd, const OUT: usize> {
     /// The numbers; what they are where not valid does not matter.
     pub(crate) numbers: [Lanes<S>; OUT],
     /// Which points have a result.
-    pub(crate) valid: S::m64s,
+    pub(crate) valid: Yes<S>,
     /// Which points the formula for one point must decide.
-    pub(crate) unsure: Option<S::m64s>,
+    pub(crate) unsure: Option<Yes<S>>,
 }
 
 /// Runs a kernel over slices of one length. `valid[i]`, where it is asked for, tells which points have a result; where
@@ -108,13 +109,13 @@ impl<T: Element, K: Kernel<IN, OUT>, const IN: usize, const OUT: usize> WithSimd
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) -> usize {
-        let n = self.inout[0].len();
+        let (n, width) = (self.inout[0].len(), REGISTERS * S::F64_LANES);
         let mut counts = simd.splat_u64s(0);
         let mut at = 0;
-        while n - at >= S::F64_LANES {
-            let flags = self.step(simd, at, at + S::F64_LANES);
-            counts = simd.add_u64s(counts, flags);
-            at += S::F64_LANES;
+        while n - at >= width {
+            let [first, second] = self.step(simd, at, at + width);
+            counts = simd.add_u64s(counts, simd.add_u64s(first, second));
+            at += width;
         }
         let mut count = 0;
         for word in bytemuck::cast_slice::<S::u64s, u64>(std::slice::from_ref(&counts)) {
@@ -122,7 +123,7 @@ impl<T: Element, K: Kernel<IN, OUT>, const IN: usize, const OUT: usize> WithSimd
         }
         if at < n {
             let flags = self.step(simd, at, n);
-            let words: &[u64] = bytemuck::cast_slice(std::slice::from_ref(&flags));
+            let words: &[u64] = bytemuck::cast_slice(&flags);
             for word in &words[..n - at] {
                 count += *word;
             }
@@ -134,10 +135,10 @@ impl<T: Element, K: Kernel<IN, OUT>, const IN: usize, const OUT: usize> WithSimd
 impl<T: Element, K: Kernel<IN, OUT>, const IN: usize, const OUT: usize> Drive<'_, T, K, IN, OUT> {
     // Loops count: an iterator's closure might be compiled for the smallest instruction set.
     #[allow(clippy::needless_range_loop)]
-    /// The points `from..to`, at most a register of them. Gives 1 where a point has a result, else 0.
+    /// The points `from..to`, at most as many as the lanes hold. Gives 1 where a point has a result, else 0.
     #[inline(always)]
-    fn step<S: Simd>(&mut self, simd: S, from: usize, to: usize) -> S::u64s {
-        let zero = Lanes { simd, v: simd.splat_f64s(0.0) };
+    fn step<S: Simd>(&mut self, simd: S, from: usize, to: usize) -> [S::u64s; REGISTERS] {
+        let zero = Lanes::splat(simd, 0.0);
         let (mut input, mut inout) = ([zero; IN], [zero; OUT]);
         for k in 0..IN {
             input[k] = Lanes::load(simd, &self.input[k][from..to]);
@@ -150,13 +151,13 @@ impl<T: Element, K: Kernel<IN, OUT>, const IN: usize, const OUT: usize> Drive<'_
             let number = Lanes::select(valid, numbers[k], zero.of(f64::NAN));
             number.store(&mut self.inout[k][from..to]);
         }
-        let mut flags = simd.select_u64s(valid, simd.splat_u64s(1), simd.splat_u64s(0));
-        let words: &mut [u64] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut flags));
+        let mut flags = ones(simd, valid);
+        let words: &mut [u64] = bytemuck::cast_slice_mut(&mut flags);
         if let Some(unsure) = unsure
             && zero.any(unsure)
         {
-            let unsure = simd.select_u64s(unsure, simd.splat_u64s(1), simd.splat_u64s(0));
-            let unsure: &[u64] = bytemuck::cast_slice(std::slice::from_ref(&unsure));
+            let unsure = ones(simd, unsure);
+            let unsure: &[u64] = bytemuck::cast_slice(&unsure);
             self.decide(from, to, unsure, words, inout.map(|l| l.v), input.map(|l| l.v));
         }
         if let Some(valid) = &mut self.valid {
@@ -196,4 +197,11 @@ impl<T: Element, K: Kernel<IN, OUT>, const IN: usize, const OUT: usize> Drive<'_
             }
         }
     }
+}
+
+/// One where there is a yes, else zero.
+#[inline(always)]
+fn ones<S: Simd>(simd: S, mask: Yes<S>) -> [S::u64s; REGISTERS] {
+    let (one, zero) = (simd.splat_u64s(1), simd.splat_u64s(0));
+    [simd.select_u64s(mask[0], one, zero), simd.select_u64s(mask[1], one, zero)]
 }

@@ -89,13 +89,20 @@ impl Element for f32 {
 }
 
 impl<S: Simd> Lanes<S> {
+    /// As many numbers as the lanes hold; where there are fewer the rest is zero.
     #[inline(always)]
     pub(super) fn load<T: Element>(simd: S, from: &[T]) -> Self {
-        Self { simd, v: T::load(simd, from) }
+        let (first, second) = from.split_at(from.len().min(S::F64_LANES));
+        Self { simd, v: [T::load(simd, first), T::load(simd, second)] }
     }
 
+    /// The first numbers, as many as there is room for.
     #[inline(always)]
     pub(super) fn store<T: Element>(self, to: &mut [T]) {
-        T::store(self.simd, self.v, to);
+        let (first, second) = to.split_at_mut(to.len().min(S::F64_LANES));
+        T::store(self.simd, self.v[0], first);
+        if !second.is_empty() {
+            T::store(self.simd, self.v[1], second);
+        }
     }
 }

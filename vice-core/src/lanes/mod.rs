@@ -17,7 +17,7 @@ mod tan;
 
 pub(crate) use drive::{Kernel, Masked, run};
 pub use element::Element;
-pub(crate) use number::{Lanes, Number};
+pub(crate) use number::{Lanes, Number, Yes};
 
 use std::sync::LazyLock;
 

@@ -74,28 +74,38 @@ impl Number for f64 {
     }
 }
 
-/// A vector register of doubles of the instruction set `S`.
+/// Registers that are worked on in turn: a formula waits for each of its steps, and two of them fill the waits of each
+/// other.
+pub(super) const REGISTERS: usize = 2;
+
+/// Two vector registers of doubles of the instruction set `S`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lanes<S: Simd> {
     pub(super) simd: S,
-    pub(super) v: S::f64s,
+    pub(super) v: [S::f64s; REGISTERS],
 }
 
+/// Yes or no for each number of [`Lanes`].
+pub(crate) type Yes<S> = [<S as Simd>::m64s; REGISTERS];
+
 impl<S: Simd> Number for Lanes<S> {
-    type Mask = S::m64s;
+    type Mask = Yes<S>;
     #[inline(always)]
     fn of(self, constant: f64) -> Self {
-        Self { simd: self.simd, v: self.simd.splat_f64s(constant) }
+        Self::splat(self.simd, constant)
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Self { simd: self.simd, v: self.simd.sqrt_f64s(self.v) }
+        let Self { simd, v: [a, b] } = self;
+        Self { simd, v: [simd.sqrt_f64s(a), simd.sqrt_f64s(b)] }
     }
     #[inline(always)]
     fn abs(self) -> Self {
         // `abs_f64s` is not always inlined, and would cost a call and a spill of all registers.
-        let negative = self.simd.sub_f64s(self.simd.splat_f64s(0.0), self.v);
-        Self { simd: self.simd, v: self.simd.max_f64s(self.v, negative) }
+        let Self { simd, v: [a, b] } = self;
+        let zero = simd.splat_f64s(0.0);
+        let (minus_a, minus_b) = (simd.sub_f64s(zero, a), simd.sub_f64s(zero, b));
+        Self { simd, v: [simd.max_f64s(a, minus_a), simd.max_f64s(b, minus_b)] }
     }
     #[inline(always)]
     fn atan(self) -> Self {
@@ -106,33 +116,41 @@ impl<S: Simd> Number for Lanes<S> {
         super::tan::tan(self)
     }
     #[inline(always)]
-    fn at_most(self, other: Self) -> S::m64s {
-        self.simd.less_than_or_equal_f64s(self.v, other.v)
+    fn at_most(self, other: Self) -> Yes<S> {
+        let (simd, [a, b], [c, d]) = (self.simd, self.v, other.v);
+        [simd.less_than_or_equal_f64s(a, c), simd.less_than_or_equal_f64s(b, d)]
     }
     #[inline(always)]
-    fn below(self, other: Self) -> S::m64s {
-        self.simd.less_than_f64s(self.v, other.v)
+    fn below(self, other: Self) -> Yes<S> {
+        let (simd, [a, b], [c, d]) = (self.simd, self.v, other.v);
+        [simd.less_than_f64s(a, c), simd.less_than_f64s(b, d)]
     }
     #[inline(always)]
-    fn select(mask: S::m64s, yes: Self, no: Self) -> Self {
-        Self { simd: yes.simd, v: yes.simd.select_f64s(mask, yes.v, no.v) }
+    fn select(mask: Yes<S>, yes: Self, no: Self) -> Self {
+        let (simd, [a, b], [c, d]) = (yes.simd, yes.v, no.v);
+        Self { simd, v: [simd.select_f64s(mask[0], a, c), simd.select_f64s(mask[1], b, d)] }
     }
     #[inline(always)]
-    fn both(self, a: S::m64s, b: S::m64s) -> S::m64s {
-        self.simd.and_m64s(a, b)
+    fn both(self, a: Yes<S>, b: Yes<S>) -> Yes<S> {
+        [self.simd.and_m64s(a[0], b[0]), self.simd.and_m64s(a[1], b[1])]
     }
 }
 
 impl<S: Simd> Lanes<S> {
     #[inline(always)]
-    pub(crate) fn negated(self, mask: S::m64s) -> S::m64s {
-        self.simd.not_m64s(mask)
+    pub(super) fn splat(simd: S, constant: f64) -> Self {
+        Self { simd, v: [simd.splat_f64s(constant); REGISTERS] }
+    }
+
+    #[inline(always)]
+    pub(crate) fn negated(self, mask: Yes<S>) -> Yes<S> {
+        [self.simd.not_m64s(mask[0]), self.simd.not_m64s(mask[1])]
     }
 
     /// Whether any number has a yes.
     #[inline(always)]
-    pub(crate) fn any(self, mask: S::m64s) -> bool {
-        self.simd.first_true_m64s(mask) < S::F64_LANES
+    pub(crate) fn any(self, mask: Yes<S>) -> bool {
+        self.simd.first_true_m64s(self.simd.or_m64s(mask[0], mask[1])) < S::F64_LANES
     }
 }
 
@@ -142,7 +160,8 @@ macro_rules! operator {
             type Output = Self;
             #[inline(always)]
             fn $name(self, other: Self) -> Self {
-                Self { simd: self.simd, v: self.simd.$of_lanes(self.v, other.v) }
+                let (simd, [a, b], [c, d]) = (self.simd, self.v, other.v);
+                Self { simd, v: [simd.$of_lanes(a, c), simd.$of_lanes(b, d)] }
             }
         }
         impl<S: Simd> $operator<f64> for Lanes<S> {

@@ -7,7 +7,7 @@ use pulp::Simd;
 use super::super::solve;
 use super::{Camera, Motion};
 use crate::camera::{Distortion, Pixel};
-use crate::lanes::{Kernel, Lanes, Masked, Number};
+use crate::lanes::{Kernel, Lanes, Masked, Number, Yes};
 
 /// No distortion.
 #[derive(Clone, Copy, Debug)]
@@ -56,7 +56,7 @@ impl<D: Distortion> Bound<D> {
 
     /// Pixel, and whether there is one.
     #[inline(always)]
-    fn project<S: Simd>(&self, [x, y, z]: [Lanes<S>; 3]) -> ([Lanes<S>; 2], S::m64s) {
+    fn project<S: Simd>(&self, [x, y, z]: [Lanes<S>; 3]) -> ([Lanes<S>; 2], Yes<S>) {
         let (x, y) = (x / z, y / z);
         let r2 = x * x + y * y;
         let valid = z.both(z.of(0.0).below(z), r2.at_most(r2.of(self.max_r2)));
@@ -66,7 +66,7 @@ impl<D: Distortion> Bound<D> {
 
     /// Ray, whether there is one, and where the single-point function must decide.
     #[inline(always)]
-    fn unproject<S: Simd>(&self, [u, v]: [Lanes<S>; 2]) -> ([Lanes<S>; 2], S::m64s, S::m64s) {
+    fn unproject<S: Simd>(&self, [u, v]: [Lanes<S>; 2]) -> ([Lanes<S>; 2], Yes<S>, Yes<S>) {
         let c = &self.camera;
         let (xd, yd) = ((u - c.cx) * self.per_fx_fy[0], (v - c.cy) * self.per_fx_fy[1]);
         if !D::DISTORTS {
