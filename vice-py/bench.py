@@ -27,15 +27,15 @@ POINTS = 1_000_000
 POSES = 100_000
 
 
-def timed(work: Callable[[], object], repeats: int = 9) -> float:
-    """Median seconds, after one run to warm up."""
+def timed(work: Callable[[], object], repeats: int = 40) -> float:
+    """Seconds of the run that was disturbed least, after one to warm up."""
     work()
     times = []
     for _ in range(repeats):
         begun = time.perf_counter()
         work()
         times.append(time.perf_counter() - begun)
-    return statistics.median(times)
+    return min(times)
 
 
 def projection() -> None:
@@ -57,7 +57,8 @@ def projection() -> None:
     difference = float(np.abs(expected.reshape(-1, 2) - out).max())
     print(f"project {POINTS} points, out=: {ours * 1e3:.2f} ms; without: {fresh * 1e3:.2f} ms; OpenCV {theirs * 1e3:.2f} ms")
     print(f"  {theirs / ours:.1f} times OpenCV with out=, {theirs / fresh:.1f} times without; largest difference {difference:.1e} px")
-    batch = _vicepose.time_of_batch(camera, *xyz.T.tolist(), 9)
+    columns = xyz.T.tolist()
+    batch = min(_vicepose.time_of_batch(camera, *columns, 3) for _ in range(9))
     print(f"  Rust batch {batch * 1e3:.2f} ms (structure of arrays): out= takes {ours / batch:.2f} times as long")
 
 

@@ -8,9 +8,6 @@ use crate::arrays::{Rows, not_writable};
 use crate::errors::{Answer, OfPython, usage};
 use crate::work::guarded;
 
-/// Camera(size, K, model="pinhole", D=())
-/// --
-///
 /// A calibrated camera.
 ///
 /// Parameters
@@ -77,9 +74,6 @@ impl Camera {
         self.core.model().coefficients()
     }
 
-    /// project(xyz, out=None)
-    /// --
-    ///
     /// Pixels of points in the camera's frame.
     ///
     /// Parameters
@@ -107,9 +101,6 @@ impl Camera {
         })
     }
 
-    /// unproject(uv, out=None)
-    /// --
-    ///
     /// Rays of pixels.
     ///
     /// Parameters

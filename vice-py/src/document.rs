@@ -81,9 +81,6 @@ impl Document {
         self.suspicions.clone()
     }
 
-    /// document()
-    /// --
-    ///
     /// All of it as a dictionary.
     fn document<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         loads(py, &self.json)
@@ -93,9 +90,6 @@ impl Document {
         loads(py, &self.json)?.get_item(key)
     }
 
-    /// to_json(path=None)
-    /// --
-    ///
     /// Writes the document of the program's ``--json``, the same bytes; without a path it is returned.
     #[pyo3(signature = (path = None))]
     fn to_json(&self, path: Option<PathBuf>) -> Answer<Option<String>> {
@@ -105,9 +99,6 @@ impl Document {
         }
     }
 
-    /// save(path)
-    /// --
-    ///
     /// Writes the form that the ending of the name asks for: ``csv``, ``tex``, ``svg``, ``zip`` (for evo_res), ``toml``
     /// (the corrected calibration of a diagnosis), whichever there is.
     fn save(&self, path: PathBuf) -> Answer<()> {
@@ -118,9 +109,6 @@ impl Document {
         }
     }
 
-    /// text(form)
-    /// --
-    ///
     /// A form as text: ``csv``, ``tex``, ``svg``, ``toml``.
     fn text(&self, form: &str) -> Answer<String> {
         String::from_utf8(self.form(form)?.to_vec())

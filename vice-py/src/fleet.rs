@@ -32,9 +32,6 @@ pub(crate) struct Batch {
 
 #[pymethods]
 impl Batch {
-    /// table()
-    /// --
-    ///
     /// The results as the paper's table.
     fn table(&self, py: Python<'_>) -> Answer<FleetTable> {
         table(py, self.folder.clone())
@@ -178,33 +175,21 @@ pub(crate) fn table(py: Python<'_>, results: PathBuf) -> Answer<FleetTable> {
 
 #[pymethods]
 impl FleetTable {
-    /// to_csv()
-    /// --
-    ///
     /// As CSV: what ``vice table --format csv`` prints.
     fn to_csv(&self) -> Answer<String> {
         self.shown(Format::Csv)
     }
 
-    /// to_latex()
-    /// --
-    ///
     /// As LaTeX: what ``vice table --format latex`` prints.
     fn to_latex(&self) -> Answer<String> {
         self.shown(Format::Latex)
     }
 
-    /// to_html()
-    /// --
-    ///
     /// As a page: what ``vice table --format html`` prints.
     fn to_html(&self) -> Answer<String> {
         self.shown(Format::Html)
     }
 
-    /// to_df()
-    /// --
-    ///
     /// The table as a pandas.DataFrame of text.
     fn to_df<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let text = py.import("io")?.call_method1("StringIO", (self.to_csv()?,))?;

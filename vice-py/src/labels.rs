@@ -17,9 +17,6 @@ use crate::recording::Recording;
 use crate::table::{Table, flags, integers, numbers, words};
 use crate::work::short;
 
-/// Labels(point, ns, uv, keyframe, source=None, occluded=None, uncertain=None)
-/// --
-///
 /// Where a human, helped by a tracker, says that scene points are. A key frame starts a segment: what follows until the
 /// next key frame of the point is scored against it.
 ///
@@ -99,9 +96,6 @@ impl Labels {
         Ok(Self::of(LabelSet::from_rows(rows).map_err(|e| usage("labels", e.to_string()))?))
     }
 
-    /// read(path, run=None)
-    /// --
-    ///
     /// Labels from a file: CSV, JSON, CVAT's XML, the authors' pickle. The last two count frames, and so need the run.
     #[classmethod]
     #[pyo3(signature = (path, run = None))]
@@ -113,9 +107,6 @@ impl Labels {
         Ok(Self::of(core))
     }
 
-    /// write(path, overwrite=False)
-    /// --
-    ///
     /// Writes them as CSV or JSON, by the ending of the name.
     #[pyo3(signature = (path, overwrite = false))]
     fn write(&self, path: PathBuf, overwrite: bool) -> Answer<()> {
@@ -123,9 +114,6 @@ impl Labels {
         Ok(labels::write(&path, &self.core, overwrite)?)
     }
 
-    /// from_df(df)
-    /// --
-    ///
     /// From a data frame with ``point``, ``timestamp_ns``, ``u_px``, ``v_px``, ``keyframe`` and perhaps ``source``,
     /// ``occluded``, ``uncertain``: the columns of :meth:`table`.
     #[classmethod]
@@ -134,17 +122,11 @@ impl Labels {
         Ok(class.call((), Some(parts.cast()?))?.unbind())
     }
 
-    /// to_df()
-    /// --
-    ///
     /// A pandas.DataFrame, a row a label.
     fn to_df<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Bound::new(py, self.table()?)?.call_method0("to_pandas")
     }
 
-    /// table()
-    /// --
-    ///
     /// The labels as a Table.
     fn table(&self) -> Answer<Table> {
         let rows: Vec<(&str, &Observation)> = self

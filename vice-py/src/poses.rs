@@ -17,9 +17,6 @@ use crate::errors::{Answer, OfPython, usage};
 use crate::table::{Table, integers, numbers};
 use crate::work::long;
 
-/// Trajectory(ns, xyz, quat_xyzw)
-/// --
-///
 /// Poses ``world_from_body`` over time.
 ///
 /// Parameters
@@ -67,9 +64,6 @@ impl Trajectory {
         Ok(Self::of(Core::from_rows(rows).map_err(|e| usage("trajectory", e.to_string()))?))
     }
 
-    /// read(path, times=None)
-    /// --
-    ///
     /// A trajectory from a file: TUM, EuRoC CSV, KITTI (with its times), a table with a heading; ``rel:FILE`` for
     /// relative motions.
     #[classmethod]
@@ -82,9 +76,6 @@ impl Trajectory {
         .map(Self::of)
     }
 
-    /// write(path, format="tum", overwrite=False)
-    /// --
-    ///
     /// Writes it: ``tum``, ``euroc``, or ``kitti`` with its times in times.txt beside it.
     #[pyo3(signature = (path, format = "tum", overwrite = false))]
     fn write(&self, path: PathBuf, format: &str, overwrite: bool) -> Answer<()> {
@@ -98,9 +89,6 @@ impl Trajectory {
         Ok(())
     }
 
-    /// from_df(df)
-    /// --
-    ///
     /// From a data frame (pandas, polars, or anything with columns by name): ``timestamp_ns`` (or ``timestamp`` as
     /// datetime64), ``x y z`` or ``tx ty tz`` in metres, ``qx qy qz qw``.
     #[classmethod]
@@ -109,9 +97,6 @@ impl Trajectory {
         Ok(class.call1(parts.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>, Bound<'_, PyAny>)>()?)?.unbind())
     }
 
-    /// from_evo(traj)
-    /// --
-    ///
     /// From a ``PoseTrajectory3D`` of evo. evo holds stamps as doubles of seconds, which are some hundred nanoseconds
     /// apart at today's epoch: they are rounded to nanoseconds.
     #[classmethod]
@@ -120,25 +105,16 @@ impl Trajectory {
         Ok(class.call1(parts.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>, Bound<'_, PyAny>)>()?)?.unbind())
     }
 
-    /// to_df()
-    /// --
-    ///
     /// A pandas.DataFrame with ``timestamp_ns``, ``x y z`` in metres and ``qx qy qz qw``.
     fn to_df<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Bound::new(py, self.table()?)?.call_method0("to_pandas")
     }
 
-    /// to_evo()
-    /// --
-    ///
     /// A ``PoseTrajectory3D`` of evo; needs evo.
     fn to_evo<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("vicepose._frames")?.call_method1("to_evo", (slf,))
     }
 
-    /// table()
-    /// --
-    ///
     /// The poses as a Table.
     fn table(&self) -> Answer<Table> {
         let (stamps, poses) = (self.core.stamps(), self.core.poses());
@@ -180,9 +156,6 @@ impl Trajectory {
         self.core.path_length_m()
     }
 
-    /// at(ns, max_gap=0.1)
-    /// --
-    ///
     /// Pose ``world_from_body`` at a stamp as an array of shape (4, 4), or None where there is none: nothing is
     /// extrapolated, and no gap wider than ``max_gap`` seconds is bridged. Linear in position, slerp in rotation.
     #[pyo3(signature = (ns, max_gap = 0.1))]

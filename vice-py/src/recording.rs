@@ -105,9 +105,6 @@ impl Recording {
         self.frames_of(py, None)
     }
 
-    /// frames_of(camera=None)
-    /// --
-    ///
     /// Stamps of a camera's frames, int64 nanoseconds of shape (N,). The place in this array is the frame's index.
     #[pyo3(signature = (camera = None))]
     fn frames_of<'py>(&self, py: Python<'py>, camera: Option<String>) -> Answer<Bound<'py, PyArray1<i64>>> {
@@ -115,9 +112,6 @@ impl Recording {
         Ok(array_of(py, frames.iter().map(|s| s.as_nanos())))
     }
 
-    /// camera(name=None)
-    /// --
-    ///
     /// Intrinsics of a camera.
     #[pyo3(signature = (name = None))]
     fn camera(&self, py: Python<'_>, name: Option<String>) -> Answer<Camera> {
@@ -125,9 +119,6 @@ impl Recording {
         Ok(Camera { core })
     }
 
-    /// body_from_camera(ns=None, camera=None)
-    /// --
-    ///
     /// Pose of a camera in the body at a stamp (the first frame's where none is given), array of shape (4, 4), metres.
     #[pyo3(signature = (ns = None, camera = None))]
     fn body_from_camera<'py>(
@@ -150,18 +141,12 @@ impl Recording {
         array_of_rows(py, pose.to_row_major().as_chunks::<4>().0.to_vec().into_iter())
     }
 
-    /// stream(name)
-    /// --
-    ///
     /// A pose stream.
     fn stream(&self, py: Python<'_>, name: String) -> Answer<Trajectory> {
         let dataset = Arc::clone(&self.dataset);
         long(py, None, move |_| Ok(dataset.trajectory(&name)?)).map(Trajectory::of)
     }
 
-    /// image(index, camera=None)
-    /// --
-    ///
     /// One image, uint8 of shape (rows, columns) or (rows, columns, 3) in the order red, green, blue.
     #[pyo3(signature = (index, camera = None))]
     fn image<'py>(&self, py: Python<'py>, index: usize, camera: Option<String>) -> Answer<Bound<'py, PyAny>> {
@@ -176,9 +161,6 @@ impl Recording {
         }
     }
 
-    /// depth_image(index, camera=None)
-    /// --
-    ///
     /// Depth along the optical axis that is registered to a frame, float32 metres of shape (rows, columns), NaN where
     /// there is none; None where the frame has no depth image.
     #[pyo3(signature = (index, camera = None))]
@@ -196,9 +178,6 @@ impl Recording {
         PyArray1::from_slice(py, image.z_m()).reshape(shape).python().map(Some)
     }
 
-    /// imu()
-    /// --
-    ///
     /// Inertial samples in the body: (ns of shape (N,), angular rates in rad/s and specific forces in m/s², each of
     /// shape (N, 3)). Empty where the robot has none.
     #[allow(clippy::type_complexity, reason = "three arrays")]
@@ -215,9 +194,6 @@ impl Recording {
         ))
     }
 
-    /// info(camera=None)
-    /// --
-    ///
     /// What it holds, in words: what ``vice info`` prints.
     #[pyo3(signature = (camera = None))]
     fn info(&self, py: Python<'_>, camera: Option<String>) -> Answer<String> {
@@ -230,9 +206,6 @@ impl Recording {
         })
     }
 
-    /// suspicions()
-    /// --
-    ///
     /// What looked wrong in what was read so far, a line each.
     fn suspicions(&self) -> Vec<String> {
         self.dataset.suspicions().iter().map(vice_run::core::suspicion::Suspicion::line).collect()

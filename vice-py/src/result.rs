@@ -80,9 +80,6 @@ const fn role_name(role: Role) -> &'static str {
 
 #[pymethods]
 impl Outcome {
-    /// read(path)
-    /// --
-    ///
     /// A result from a file, as ``to_json`` and ``vice evaluate --json`` write it.
     #[classmethod]
     #[pyo3(name = "read")]
@@ -90,9 +87,6 @@ impl Outcome {
         long(py, None, move |_| Ok(read(&path)?)).map(|document| Self::new(document, None))
     }
 
-    /// from_json(text)
-    /// --
-    ///
     /// A result from the text of its document.
     #[classmethod]
     fn from_json(_: &Bound<'_, PyType>, text: &str) -> Answer<Self> {
@@ -144,9 +138,6 @@ impl Outcome {
         self.document.suspicions.iter().map(Suspicion::line).collect()
     }
 
-    /// table()
-    /// --
-    ///
     /// A row for each pose stream with each depth source. ``rmse_px`` with ``low_95_px`` and ``high_95_px`` is of the
     /// labels that hold, ``pooled_px`` of all; ``scored`` and ``skipped`` count labels; ``rmse_3d_m``, ``aoe_rad``,
     /// ``roe_rad`` and ``poses`` are of an estimate against the reference. NaN where a number could not be had.
@@ -176,9 +167,6 @@ impl Outcome {
         ])
     }
 
-    /// samples(stream=None, depth=None, role=None)
-    /// --
-    ///
     /// The scored labels of a pose stream with a depth source, or of all: ``point``, ``timestamp_ns``, the label and the
     /// carried point in pixels, and their distance ``error_px``. A name that is both an estimate and the reference means
     /// the estimate, unless ``role`` is ``reference``.
@@ -203,9 +191,6 @@ impl Outcome {
         ])
     }
 
-    /// broken(*limits)
-    /// --
-    ///
     /// A sentence for each limit that is not kept, such as ``rmse_2d<2px``, ``age5s<3px``, ``moved1m<40mm``: those of
     /// ``vice evaluate --require``. Empty where all are kept.
     #[pyo3(signature = (*limits))]
@@ -214,17 +199,11 @@ impl Outcome {
         Ok(broken(&parsed.collect::<Answer<Vec<_>>>()?, &self.document.pixel))
     }
 
-    /// document()
-    /// --
-    ///
     /// The whole document as a dictionary.
     fn document<'py>(&self, py: Python<'py>) -> Answer<Bound<'py, PyAny>> {
         loads(py, &serde_json::to_string(self.document.as_ref())?).python()
     }
 
-    /// to_json(path=None)
-    /// --
-    ///
     /// Writes the document, with the bytes of ``vice evaluate --json``; without a path its text is returned.
     #[pyo3(signature = (path = None))]
     fn to_json(&self, py: Python<'_>, path: Option<PathBuf>) -> Answer<Option<String>> {
@@ -239,27 +218,18 @@ impl Outcome {
         })
     }
 
-    /// to_csv(path=None)
-    /// --
-    ///
     /// The table as ``vice evaluate --csv`` writes it; without a path its text is returned.
     #[pyo3(signature = (path = None))]
     fn to_csv(&self, py: Python<'_>, path: Option<PathBuf>) -> Answer<Option<String>> {
         given_or_written(short(py, || csv::render(&self.document))?, path)
     }
 
-    /// to_latex(path=None)
-    /// --
-    ///
     /// The table as ``vice evaluate --latex`` writes it; without a path its text is returned.
     #[pyo3(signature = (path = None))]
     fn to_latex(&self, py: Python<'_>, path: Option<PathBuf>) -> Answer<Option<String>> {
         given_or_written(short(py, || latex::render(&self.document))?, path)
     }
 
-    /// report(path, run=None, progress=None)
-    /// --
-    ///
     /// Writes the page with the table, plots and images, with the bytes of ``vice evaluate --report``. The images are
     /// read from the run that was evaluated; of a result that was read from a file, from ``run`` or from where it says.
     #[pyo3(signature = (path, run = None, progress = None))]

@@ -85,9 +85,6 @@ impl Table {
         values(py, self.batch.column(self.index(name)?))
     }
 
-    /// to_dict()
-    /// --
-    ///
     /// Columns by name: arrays of NumPy (NaN for null), lists of text.
     pub(crate) fn to_dict<'py>(&self, py: Python<'py>) -> Answer<Bound<'py, PyDict>> {
         let columns = PyDict::new(py);
@@ -97,18 +94,12 @@ impl Table {
         Ok(columns)
     }
 
-    /// to_pandas()
-    /// --
-    ///
     /// A pandas.DataFrame; needs pandas.
     fn to_pandas<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let py = slf.py();
         py.import("pandas")?.call_method1("DataFrame", (slf.get().to_dict(py)?,))
     }
 
-    /// to_polars()
-    /// --
-    ///
     /// A polars.DataFrame without a copy; needs polars.
     fn to_polars<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("polars")?.call_method1("DataFrame", (slf,))

@@ -1,4 +1,4 @@
-"""Arguments of calls as requests."""
+"""The functions of the module."""
 
 from __future__ import annotations
 
@@ -6,19 +6,13 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Union
+from typing import Any
 
 from . import _vicepose
 from ._errors import UsageError
 from ._progress import Progress, shown
-from ._vicepose import Batch, Document, FleetTable, Labels, Result, Run, Table, Trajectory
-
-PathLike = Union[str, "os.PathLike[str]"]
-#: Poses, or the name of a stream of the run, of a file, ``rel:FILE``, or ``imu-euler``.
-Estimate = Union[Trajectory, PathLike]
-#: One estimate, several, or several by the names that the result has for them.
-Estimates = Union[Estimate, Sequence[Estimate], Mapping[str, Estimate]]
-
+from ._request import OPTIONS, Estimate, Estimates, PathLike, as_list, pairs, request_text, without_none
+from ._vicepose import Batch, Document, FleetTable, Labels, Result, Run
 
 def open(
     source: Any,
@@ -63,144 +57,6 @@ def _word(value: object) -> str:
     return {True: "true", False: "false"}[value] if isinstance(value, bool) else str(value)
 
 
-def _pairs(estimates: Estimates) -> list[tuple[str | None, Any]]:
-    if isinstance(estimates, Mapping):
-        return [(str(name), value) for name, value in estimates.items()]
-    if isinstance(estimates, (Trajectory, str, os.PathLike)):
-        return [(None, estimates)]
-    several = list(estimates)
-    nameless = sum(isinstance(value, Trajectory) for value in several)
-    if nameless > 1:
-        raise UsageError("several trajectories need names: give a dict", argument="estimates")
-    return [(None, value) for value in several]
-
-
-def _list(value: Any) -> list[Any] | None:
-    if value is None:
-        return None
-    return [value] if isinstance(value, (str, int)) else list(value)
-
-
-def _without_none(values: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in values.items() if value is not None}
-
-
-def _number(value: float | None) -> float | None:
-    return None if value is None else float(value)
-
-
-def _numbers(values: Sequence[float] | None) -> list[float] | None:
-    return None if values is None else [float(value) for value in values]
-
-
-def _text(path: PathLike | None) -> str | None:
-    return None if path is None else os.fspath(path)
-
-
-_REQUEST = """
-    Other parameters
-    ----------------
-    camera : str, optional
-        Camera; the first where it is left out.
-    calibration : path, optional
-        Calibration that overrides the recording's: TOML, or a Kalibr camchain.
-    floor_plane : (nx, ny, nz, d), optional
-        Floor plane n·p + d = 0 in the world, metres, in place of the recording's.
-    points : sequence of str, optional
-        Only these points.
-    observations : {"certain", "manual", "all"}
-        Whose labels count.
-    fps : float, optional
-        Keep the frame nearest to each tick of this rate (Hz), and every key frame.
-    start, duration : float, optional
-        Seconds after the camera's first frame, and from there.
-    reference : Trajectory, str or "none", optional
-        What estimates are compared with; the ground truth where there is one.
-    estimate_frame : {"body", "camera"} or path
-        Whose poses the estimates give.
-    estimate_as : sequence of str, optional
-        What the estimates are, where that is not what they are read as: ``inverse``, ``wxyz``, ``ned``, ``mm``, ...
-    times : path, optional
-        Times of KITTI files.
-    time_offset : float, optional
-        Seconds added to the stamps of the estimates.
-    max_gap : float
-        Widest gap between two poses that is interpolated, seconds.
-    anchor : str, optional
-        What places the camera in the world for depth: ``reference``, ``estimate``, or the name of a stream.
-    initial_pose : (x, y, z, qx, qy, qz, qw), optional
-        Pose ``world_from_body`` of the anchoring estimate at the first key frame, metres.
-    zmap_occlusion, zmap_interpolation, cloud_voxel, zcam_range, tag_size, tag_family, depth_check, subsets, align
-        As the options of ``vice evaluate`` of these names.
-"""
-
-
-def _request(
-    *,
-    depth: str | Sequence[str] | None,
-    camera: str | None = None,
-    calibration: PathLike | None = None,
-    floor_plane: Sequence[float] | None = None,
-    points: Sequence[str] | None = None,
-    observations: str | None = None,
-    fps: float | None = None,
-    start: float | None = None,
-    duration: float | None = None,
-    estimate_frame: PathLike | None = None,
-    estimate_as: str | Sequence[str] | None = None,
-    times: PathLike | None = None,
-    time_offset: float | None = None,
-    max_gap: float | None = None,
-    anchor: str | None = None,
-    initial_pose: Sequence[float] | None = None,
-    zmap_occlusion: bool | None = None,
-    zmap_interpolation: str | None = None,
-    cloud_voxel: float | None = None,
-    zcam_range: Sequence[float] | None = None,
-    tag_size: float | None = None,
-    tag_family: str | None = None,
-    depth_check: bool | None = None,
-    subsets: int | Sequence[int] | None = None,
-    align: str | None = None,
-) -> str:
-    """The request without the run, the labels and the streams: plain data, as a file of ``vice evaluate --request``."""
-    request = {
-        "dataset": _without_none(
-            {"camera": camera, "calibration": _text(calibration), "floor_plane": _numbers(floor_plane)}
-        ),
-        "labels": {"file": "", **_without_none({"points": _list(points), "observations": observations})},
-        "protocol": _without_none({"fps": _number(fps), "start_s": _number(start), "duration_s": _number(duration)}),
-        "streams": _without_none(
-            {
-                "estimate_frame": _text(estimate_frame),
-                "estimate_as": _list(estimate_as),
-                "times": _text(times),
-                "time_offset_s": _number(time_offset),
-                "max_gap_s": _number(max_gap),
-                "anchor": anchor,
-                "initial_pose": _numbers(initial_pose),
-            }
-        ),
-        "depth": _without_none(
-            {
-                "sources": _list(depth),
-                "zmap_occlusion": zmap_occlusion,
-                "zmap_interpolation": zmap_interpolation,
-                "cloud_voxel_m": _number(cloud_voxel),
-                "zcam_range_m": _numbers(zcam_range),
-                "tag_size_m": _number(tag_size),
-                "tag_family": tag_family,
-                "compare": depth_check,
-            }
-        ),
-        "scoring": _without_none({"subsets": _list(subsets), "align": align}),
-    }
-    try:
-        return json.dumps(request, allow_nan=False)
-    except ValueError as error:
-        raise UsageError("a number is not finite") from error
-
-
 def evaluate(
     run: Run | PathLike,
     labels: Labels | PathLike,
@@ -235,9 +91,9 @@ def evaluate(
     Error
         The class below it that says what is wrong, with ``path``, ``line``, ``hint``, ``argument``.
     """
-    request = _request(depth=depth, **options)
+    request = request_text(depth=depth, **options)
     with shown(progress) as told:
-        return _vicepose.evaluate(open(run), labels, _pairs(estimates), reference, request, samples, told)
+        return _vicepose.evaluate(open(run), labels, pairs(estimates), reference, request, samples, told)
 
 
 def evaluate_request(path: PathLike, *, progress: Progress = False) -> Result:
@@ -247,14 +103,14 @@ def evaluate_request(path: PathLike, *, progress: Progress = False) -> Result:
 
 
 def _one(estimate: Any) -> tuple[str | None, Any]:
-    pairs = _pairs(estimate)
-    if len(pairs) != 1:
-        raise UsageError(f"one estimate is expected, not {len(pairs)}", argument="estimate")
-    return pairs[0]
+    several = pairs(estimate)
+    if len(several) != 1:
+        raise UsageError(f"one estimate is expected, not {len(several)}", argument="estimate")
+    return several[0]
 
 
 def _looking(flaws: Sequence[str] | None, odometry_noise: str | None) -> str:
-    return json.dumps(_without_none({"flaws": _list(flaws), "odometry_noise": odometry_noise}))
+    return json.dumps(without_none({"flaws": as_list(flaws), "odometry_noise": odometry_noise}))
 
 
 def diagnose(
@@ -285,7 +141,7 @@ def diagnose(
         ``vice.diagnosis/1``: ``d["verdict"]["sentence"]`` says it in words, ``d.save("corrected.toml")`` writes the
         calibration without the named flaws.
     """
-    request = _request(depth=depth, **options)
+    request = request_text(depth=depth, **options)
     looking = _looking(flaws, odometry_noise)
     with shown(progress) as told:
         return _vicepose.diagnose(open(run), labels, _one(estimate), reference, request, looking, told)
@@ -310,14 +166,14 @@ def sensitivity(
     Document
         ``vice.sensitivity/1``, with forms ``csv`` and ``svg``.
     """
-    request = _request(depth=depth, **options)
+    request = request_text(depth=depth, **options)
     looking = _looking(flaws, odometry_noise)
     with shown(progress) as told:
         return _vicepose.sensitivity(open(run), labels, _one(estimate), reference, request, looking, told)
 
 
 for _function in (evaluate, diagnose, sensitivity):
-    _function.__doc__ = (_function.__doc__ or "").rstrip() + "\n" + _REQUEST
+    _function.__doc__ = (_function.__doc__ or "").rstrip() + "\n" + OPTIONS
 
 
 def compare(*results: Result | PathLike, by: str | None = None, seed: int = 1, names: Sequence[str] = ()) -> Document:
@@ -524,9 +380,6 @@ class Check:
 
 __all__ = [
     "Check",
-    "Estimate",
-    "Estimates",
-    "Table",
     "batch",
     "check_format",
     "collect",

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import ray
+import ray  # type: ignore[import-not-found,unused-ignore]
 
 from . import _vicepose
 from ._errors import Error

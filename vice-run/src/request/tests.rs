@@ -80,3 +80,25 @@ fn what_is_read_is_known_before_it_is_read() {
         assert!(inputs.contains(&PathBuf::from(file)), "{file}");
     }
 }
+
+#[test]
+fn names_tell_the_estimates_apart() {
+    let named = |names: &[&str]| {
+        let estimates = ["a.txt", "imu-euler"].map(|e| EstimateSpec::from(e.to_string()));
+        let mut request = Request::new("run", "l.csv", estimates);
+        request.streams.names = names.iter().map(|n| (*n).to_string()).collect();
+        request
+    };
+    assert!(named(&[]).check().is_ok() && named(&["mine", "imu"]).check().is_ok());
+    for (names, problem) in [
+        (&["mine"][..], "1 names for 2 estimates"),
+        (&["mine", "mine"], "`mine` names no estimate of its own"),
+        (&["mine", " "], "` ` names no estimate of its own"),
+    ] {
+        assert_eq!(named(names).check().unwrap_err().problem(), problem);
+    }
+    assert!(named(&[]).has_command_line() && !named(&["mine", "imu"]).has_command_line());
+    let mut held = named(&[]);
+    held.labels.file = "in-memory:labels@00".into();
+    assert!(!held.has_command_line(), "no file holds these labels");
+}

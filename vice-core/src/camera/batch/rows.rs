@@ -1,11 +1,13 @@
 //! Many points at once as the rows of an array, which is how other languages hold them.
 
+use pulp::{Simd, WithSimd};
+
 use super::kernels::{Project, Unproject};
 use crate::camera::{Camera, with_lens};
-use crate::lanes::{Kernel, run};
+use crate::lanes::{ARCH, Kernel, run};
 
 /// Points that are turned into columns at a time: they and their results stay in the nearest cache.
-const BLOCK: usize = 512;
+const BLOCK: usize = 128;
 /// Points that a thread works on at a time.
 const PIECE: usize = 16_384;
 
@@ -19,7 +21,7 @@ impl Camera {
     /// If the slices differ in length.
     pub fn project_rows(&self, xyz_m: &[[f64; 3]], uv_px: &mut [[f64; 2]]) -> usize {
         assert_eq!(xyz_m.len(), uv_px.len(), "project_rows: slices differ in length");
-        with_lens!(self, bound => in_pieces(Project { bound }, xyz_m, uv_px, &|columns| columns))
+        with_lens!(self, bound => in_pieces(Project { bound }, xyz_m, uv_px))
     }
 
     /// The rays `[x, y, 1]` of the pixels `[u, v]`, in one pass over memory.
@@ -31,8 +33,7 @@ impl Camera {
     /// If the slices differ in length.
     pub fn unproject_rows(&self, uv_px: &[[f64; 2]], rays: &mut [[f64; 3]]) -> usize {
         assert_eq!(uv_px.len(), rays.len(), "unproject_rows: slices differ in length");
-        let with_one = |[x, y]: [f64; 2]| [x, y, if x.is_nan() { f64::NAN } else { 1.0 }];
-        with_lens!(self, bound => in_pieces(Unproject { bound }, uv_px, rays, &with_one))
+        with_lens!(self, bound => in_pieces(Unproject { bound }, uv_px, rays))
     }
 }
 
@@ -41,42 +42,87 @@ fn in_pieces<K: Kernel<IN, 2>, const IN: usize, const OUT: usize>(
     kernel: K,
     input: &[[f64; IN]],
     output: &mut [[f64; OUT]],
-    row: &(impl Fn([f64; 2]) -> [f64; OUT] + Sync),
 ) -> usize {
     if input.len() <= PIECE || crate::parallel::current_num_threads() == 1 {
-        return in_blocks(kernel, input, output, row);
+        return ARCH.dispatch(Blocks { kernel, input, output });
     }
     let middle = (input.len() / 2).next_multiple_of(BLOCK);
     let (input_a, input_b) = input.split_at(middle);
     let (output_a, output_b) = output.split_at_mut(middle);
     let (a, b) = crate::parallel::join(
-        || in_pieces(kernel, input_a, output_a, row),
-        || in_pieces(kernel, input_b, output_b, row),
+        || in_pieces(kernel, input_a, output_a),
+        || in_pieces(kernel, input_b, output_b),
     );
     a + b
 }
 
-/// Turns blocks of rows into columns, and the results back.
-fn in_blocks<K: Kernel<IN, 2>, const IN: usize, const OUT: usize>(
+/// Turns blocks of rows into columns, and the results back: for the widest instruction set, since moving numbers about
+/// costs as much as the arithmetic.
+struct Blocks<'a, K, const IN: usize, const OUT: usize> {
     kernel: K,
-    input: &[[f64; IN]],
-    output: &mut [[f64; OUT]],
-    row: &impl Fn([f64; 2]) -> [f64; OUT],
-) -> usize {
-    let mut columns = [[0.0; BLOCK]; IN];
-    let [mut first, mut second] = [[0.0; BLOCK]; 2];
-    let mut count = 0;
-    for (from, to) in input.chunks(BLOCK).zip(output.chunks_mut(BLOCK)) {
-        let n = from.len();
-        for (i, point) in from.iter().enumerate() {
-            for k in 0..IN {
-                columns[k][i] = point[k];
-            }
+    input: &'a [[f64; IN]],
+    output: &'a mut [[f64; OUT]],
+}
+
+impl<K: Kernel<IN, 2>, const IN: usize, const OUT: usize> WithSimd for Blocks<'_, K, IN, OUT> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> usize {
+        let (input, input_rest) = self.input.as_chunks::<BLOCK>();
+        let (output, output_rest) = self.output.as_chunks_mut::<BLOCK>();
+        let mut columns = Columns { input: [[0.0; BLOCK]; IN], output: [[0.0; BLOCK]; 2] };
+        let (mut count, mut i) = (0, 0);
+        while i < input.len() {
+            count += block(self.kernel, &mut columns, &input[i], &mut output[i], BLOCK);
+            i += 1;
         }
-        let of_block = columns.each_ref().map(|column| &column[..n]);
-        count += run("rows", kernel, of_block, [&mut first[..n], &mut second[..n]], None);
-        for ((to, a), b) in to.iter_mut().zip(&first).zip(&second) {
-            *to = row([*a, *b]);
+        if input_rest.is_empty() {
+            return count;
+        }
+        let n = input_rest.len();
+        let (mut from, mut to) = ([[0.0; IN]; BLOCK], [[0.0; OUT]; BLOCK]);
+        from[..n].copy_from_slice(input_rest);
+        count += block(self.kernel, &mut columns, &from, &mut to, n);
+        output_rest.copy_from_slice(&to[..n]);
+        count
+    }
+}
+
+/// A block as columns, and its results.
+struct Columns<const IN: usize> {
+    input: [[f64; BLOCK]; IN],
+    output: [[f64; BLOCK]; 2],
+}
+
+/// The first `n` points of a block. Its length is known to the compiler, which then moves many numbers at once.
+// Loops count: an iterator's closure might be compiled for the smallest instruction set.
+#[allow(clippy::needless_range_loop)]
+#[inline(always)]
+fn block<K: Kernel<IN, 2>, const IN: usize, const OUT: usize>(
+    kernel: K,
+    columns: &mut Columns<IN>,
+    from: &[[f64; IN]; BLOCK],
+    to: &mut [[f64; OUT]; BLOCK],
+    n: usize,
+) -> usize {
+    let Columns { input, output: [first, second] } = columns;
+    for i in 0..BLOCK {
+        for k in 0..IN {
+            input[k][i] = from[i][k];
+        }
+    }
+    let mut of_block: [&[f64]; IN] = [&[]; IN];
+    for k in 0..IN {
+        of_block[k] = &input[k][..n];
+    }
+    let count = run("rows", kernel, of_block, [&mut first[..n], &mut second[..n]], None);
+    for i in 0..BLOCK {
+        to[i][0] = first[i];
+        to[i][1] = second[i];
+        if OUT == 3 {
+            // The ray's third number, where there is a ray.
+            to[i][2] = if first[i].is_nan() { f64::NAN } else { 1.0 };
         }
     }
     count
