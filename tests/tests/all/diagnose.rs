@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use serde_json::Value;
 use vice_core::diagnose::{Flaw, VerdictKind};
 use vice_core::frames::{Body, BodyFromCamera, Camera, Rigid};
+use vice_core::random::SplitMix;
 use vice_files::atomic::Overwrite;
 use vice_files::calibration::{CalibrationFile, CameraOverride};
 use vice_tests::flawed::Flawed;
@@ -330,6 +331,72 @@ fn intervals(part: &Value) -> f64 {
         .iter()
         .map(|p| 0.5 * (p["high"].as_f64().unwrap() - p["low"].as_f64().unwrap()));
     widths.fold(0.0, f64::max)
+}
+
+/// The labels of a file with noise of so many pixels on top.
+fn noisy(labels: &Path, noise_px: f64, to: &Path) {
+    let mut random = SplitMix::new(5);
+    let text = std::fs::read_to_string(labels).unwrap();
+    let mut lines: Vec<String> = text.lines().map(str::to_string).collect();
+    for line in &mut lines[1..] {
+        let mut cells: Vec<String> = line.split(',').map(str::to_string).collect();
+        for cell in &mut cells[2..4] {
+            *cell = (cell.parse::<f64>().unwrap() + noise_px * random.normal()).to_string();
+        }
+        *line = cells.join(",");
+    }
+    std::fs::write(to, lines.join("\n") + "\n").unwrap();
+}
+
+/// Labels may be far better than the noise that is expected of them: rendered ones have none, a tracker's a tenth of a
+/// pixel. The size of the noise must be found, or what leaves nothing is less likely than what leaves pixels.
+#[test]
+fn labels_without_noise_name_the_flaw_as_noisy_ones_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = vice_tests::vice_in(folder.path(), &["synth", "flight", "--duration", "6", "--rate", "10"]);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    for noise_px in [0.0, 0.1, 0.4] {
+        let labels = format!("labels-{noise_px}.csv");
+        noisy(&folder.path().join("flight/labels/floor.csv"), noise_px, &folder.path().join(&labels));
+        for (estimate, flaw, value, tolerance) in
+            [("clock-offset", "clock-offset", 0.05, 0.004), ("drift", "drift", 0.016, 0.003)]
+        {
+            let estimate = format!("flight/estimates/{estimate}.txt");
+            let words = [
+                "diagnose",
+                "flight",
+                "--labels",
+                &labels,
+                "--estimate",
+                &estimate,
+                "--depth",
+                "floor",
+                "--json",
+                "-",
+            ];
+            let document: Value =
+                serde_json::from_str(&good(vice_tests::vice_in(folder.path(), &words))).unwrap();
+            let verdict = &document["verdict"];
+            assert_eq!(verdict["flaws"], serde_json::json!([flaw]), "{noise_px} px: {verdict}");
+            let found = values(fitted(&document, flaw))[0];
+            assert!((found - value).abs() < tolerance, "{noise_px} px: {found}");
+        }
+        let exact = [
+            "diagnose",
+            "flight",
+            "--labels",
+            &labels,
+            "--estimate",
+            "flight/estimates/exact.txt",
+            "--depth",
+            "floor",
+            "--json",
+            "-",
+        ];
+        let document: Value =
+            serde_json::from_str(&good(vice_tests::vice_in(folder.path(), &exact))).unwrap();
+        assert_eq!(document["verdict"]["kind"], "no-flaw", "{noise_px} px: {}", document["verdict"]);
+    }
 }
 
 #[test]

@@ -31,6 +31,8 @@ const USUAL_LABELS: f64 = 1200.0;
 const NONE: f64 = 0.35;
 const ONE: f64 = 0.5;
 const TWO: f64 = 0.15;
+/// Rounds in which sizes of the noise are found to the end.
+const SIZED_IN_FULL: usize = 5;
 /// At most so many jumps.
 const MOST_JUMPS: usize = 3;
 
@@ -225,14 +227,21 @@ fn same_sizes(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
 fn sized(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
     let best = best_of(&fits);
     // To the end: a pair that starts from here must not win by better sizes.
-    let first = work.sized(fits[best].clone(), 5);
+    let first = work.sized(fits[best].clone(), SIZED_IN_FULL);
     let limit = first.score - CLOSE;
+    let left = |fit: &Fit| robust_cost(&fit.residuals_now());
+    let left_by_first = left(&first);
     let fits: Vec<Fit> = fits
         .into_par_iter()
         .enumerate()
         .map(|(i, fit)| {
             if i == best {
                 return first.clone();
+            }
+            // What leaves less than the best does may be far from it only for want of sizes as small as what it leaves.
+            let leaves_less = left(&fit) < SAME_VALLEY * left_by_first;
+            if leaves_less {
+                return work.sized(fit, SIZED_IN_FULL);
             }
             let fit = work.rescored(Fit { logs: first.logs, ..fit });
             // Far from the best the best one's sizes are far from right.
