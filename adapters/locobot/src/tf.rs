@@ -5,8 +5,9 @@
 //! `odom -> base` at 50 Hz cannot be interpolated as one.
 
 mod build;
+mod roots;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::suspicion::Suspicion;
@@ -91,9 +92,10 @@ impl TfTree {
     pub(crate) fn find_near(&self, name: &str, near: Option<&str>) -> Option<String> {
         self.find(name).or_else(|| {
             let mut prefix = near?;
+            let frames = self.frames();
             while let Some((outer, _)) = prefix.rsplit_once('/') {
                 let own = format!("{outer}/{name}");
-                if self.frames().contains(&own.as_str()) {
+                if frames.binary_search(&own.as_str()).is_ok() {
                     return Some(own);
                 }
                 prefix = outer;
@@ -180,25 +182,9 @@ impl TfTree {
 
     /// The frames on which nothing else hangs above, with the number of frames under each; sorted.
     pub(crate) fn roots(&self) -> DataResult<Vec<(String, usize)>> {
-        let mut roots: BTreeMap<&str, usize> = BTreeMap::new();
-        // The roots of frames that were met on the way up, so that each edge is gone up once.
-        let mut known: HashMap<&str, &str> = HashMap::new();
-        for frame in self.edges.keys() {
-            let (mut way, mut at): (Vec<&str>, &str) = (Vec::new(), frame);
-            let root = loop {
-                if let Some(root) = known.get(at) {
-                    break *root;
-                }
-                let Some(edge) = self.edges.get(at) else { break at };
-                if way.len() >= self.edges.len() {
-                    return Err(self.cycle(at));
-                }
-                way.push(at);
-                at = &edge.parent;
-            };
-            known.extend(way.into_iter().map(|frame| (frame, root)));
-            *roots.entry(root).or_default() += 1;
-        }
+        let parent = |frame: &str| self.edges.get(frame).map(|edge| edge.parent.as_str());
+        let children = self.edges.keys().map(String::as_str);
+        let roots = roots::count(children, parent).map_err(|frame| self.cycle(frame))?;
         Ok(roots.into_iter().map(|(root, n)| (root.to_string(), n)).collect())
     }
 
