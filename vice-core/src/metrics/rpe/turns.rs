@@ -159,8 +159,7 @@ impl Ball {
         let half = |angle: f64| (angle / 2.0).cos();
         let Band { lower, upper, .. } = *band;
         // The larger the angle the smaller the cosine. No angle is beyond a half turn, and none below zero.
-        let none_below =
-            if upper + radius < PI { half(upper + radius) - MARGIN } else { f64::NEG_INFINITY };
+        let none_below = if upper + radius < PI { half(upper + radius) - MARGIN } else { f64::NEG_INFINITY };
         let none_above = if lower > radius { half(lower - radius) + MARGIN } else { f64::INFINITY };
         let all_to = if lower + radius < PI { half(lower + radius) - MARGIN } else { f64::NEG_INFINITY };
         let all_from = match upper {
