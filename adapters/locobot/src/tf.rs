@@ -7,7 +7,7 @@
 mod build;
 mod roots;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::suspicion::Suspicion;
@@ -46,6 +46,8 @@ struct Edge {
 #[derive(Clone, Debug)]
 pub(crate) struct TfTree {
     edges: BTreeMap<String, Edge>,
+    /// Children and parents, by name.
+    frames: Vec<String>,
     /// Oddities that were met while it was built, each kind once.
     pub(crate) notes: Vec<Suspicion>,
     /// Why no tf is used, where it comes from several robots and nothing says which is meant.
@@ -64,20 +66,20 @@ pub(crate) struct Chain<'a> {
 impl TfTree {
     /// All frames, by name.
     pub(crate) fn frames(&self) -> Vec<&str> {
-        let all = self.edges.iter().flat_map(|(child, edge)| [child.as_str(), edge.parent.as_str()]);
-        all.collect::<BTreeSet<_>>().into_iter().collect()
+        self.frames.iter().map(String::as_str).collect()
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.frames.binary_search_by(|frame| frame.as_str().cmp(name)).is_ok()
     }
 
     /// A frame by its name, or by its name behind a prefix such as `locobot/`, where only one fits.
     pub(crate) fn find(&self, name: &str) -> Option<String> {
-        let frames = self.frames();
-        if frames.contains(&name) {
+        if self.has(name) {
             return Some(name.to_string());
         }
-        let behind = format!("/{name}");
-        let mut fitting = frames.into_iter().filter(|f| f.ends_with(&behind));
-        match (fitting.next(), fitting.next()) {
-            (Some(frame), None) => Some(frame.to_string()),
+        match self.behind_prefixes(name)[..] {
+            [frame] => Some(frame.to_string()),
             _ => None,
         }
     }
@@ -85,17 +87,16 @@ impl TfTree {
     /// All frames of a name behind a prefix.
     pub(crate) fn behind_prefixes(&self, name: &str) -> Vec<&str> {
         let behind = format!("/{name}");
-        self.frames().into_iter().filter(|frame| frame.ends_with(&behind)).collect()
+        self.frames.iter().map(String::as_str).filter(|frame| frame.ends_with(&behind)).collect()
     }
 
     /// As [`TfTree::find`]; where several prefixes fit, the one that is `near`'s too, as of one robot of many.
     pub(crate) fn find_near(&self, name: &str, near: Option<&str>) -> Option<String> {
         self.find(name).or_else(|| {
             let mut prefix = near?;
-            let frames = self.frames();
             while let Some((outer, _)) = prefix.rsplit_once('/') {
                 let own = format!("{outer}/{name}");
-                if frames.binary_search(&own.as_str()).is_ok() {
+                if self.has(&own) {
                     return Some(own);
                 }
                 prefix = outer;
@@ -160,7 +161,7 @@ impl TfTree {
         if target_root != source_root {
             let problem = format!("tf does not connect {target} and {source}");
             let frames = self.frames();
-            return Err(match [target, source].into_iter().find(|f| !frames.contains(f)) {
+            return Err(match [target, source].into_iter().find(|f| !self.has(f)) {
                 Some(unknown) => DataError::new(format!("{problem}: it has no frame {unknown}"))
                     .hint(format!("its frames: {}", list(&frames))),
                 None => DataError::new(format!(

@@ -49,12 +49,14 @@ pub struct PoseRows {
 pub fn read_micros_rows(path: &Path) -> DataResult<PoseRows> {
     let read = |rows| {
         let (collected, lenient) = gather(rows, Places::Blackbird, || Kept::Rows(Vec::new(), Vec::new()))?;
-        let Collected::Poses(PoseCollector { kept: Kept::Rows(rows, lines), .. }) = collected else {
-            return Err(DataError::new("the rows have no stamps"));
-        };
-        lenient.check(rows.len(), "pose")?;
-        let suspicions = lenient.suspicions(&path.display().to_string());
-        Ok(PoseRows { rows, lines, suspicions })
+        if let Collected::Poses(poses) = collected
+            && let Kept::Rows(rows, lines) = poses.kept
+        {
+            lenient.check(rows.len(), "pose")?;
+            let suspicions = lenient.suspicions(&path.display().to_string());
+            return Ok(PoseRows { rows, lines, suspicions });
+        }
+        Err(DataError::new("the rows have no stamps"))
     };
     crate::rows::open(path).and_then(read).map_err(|e| e.at(path))
 }
@@ -106,14 +108,14 @@ pub(super) fn first_is_pose<R: BufRead>(mut rows: Rows<R>) -> DataResult<bool> {
 
 /// The rows so far, in the layout of the first.
 enum Collected {
-    Poses(PoseCollector),
+    Poses(Box<PoseCollector>),
     Matrices(MatrixCollector),
 }
 
 impl Collected {
     fn new(layout: Layout, kept: Kept) -> Self {
         match layout {
-            Layout::Poses(layout) => Self::Poses(PoseCollector::new(layout, kept)),
+            Layout::Poses(layout) => Self::Poses(Box::new(PoseCollector::new(layout, kept))),
             Layout::Matrices(rows) => Self::Matrices(MatrixCollector::new(rows)),
         }
     }

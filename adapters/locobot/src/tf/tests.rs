@@ -105,6 +105,24 @@ fn a_chain_of_thousands_of_frames_is_one_way() {
 }
 
 #[test]
+fn frames_that_any_two_builders_hang_differently_are_found() {
+    let of = |edges: &[(&str, &str, f64)]| {
+        let mut builder = TfBuilder::default();
+        edges.iter().for_each(|(parent, child, x)| builder.fix(parent, child, at(*x, 0.0)));
+        builder
+    };
+    let first = of(&[("odom", "base", 1.0), ("base", "camera", 1.0), ("base", "arm", 1.0)]);
+    let same = of(&[("base", "camera", 1.0)]);
+    let other = of(&[("base", "camera", 1.0), ("base", "arm", 2.0), ("map", "base", 1.0)]);
+    let found: Vec<&str> =
+        TfBuilder::contradictions([&first, &same, &other].into_iter()).into_iter().collect();
+    assert_eq!(found, ["arm", "base"]);
+    assert!(first.contradicts(&other) && other.contradicts(&first));
+    assert!(!first.contradicts(&same) && !same.contradicts(&other));
+    assert!(TfBuilder::contradictions([&first, &same].into_iter()).is_empty());
+}
+
+#[test]
 fn oddities_are_noted() {
     let mut builder = TfBuilder::default();
     builder.fix("a", "b", at(1.0, 0.0));

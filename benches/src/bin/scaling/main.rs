@@ -117,9 +117,9 @@ fn build() -> Result<PathBuf> {
         return Err("vice cannot be built".into());
     }
     let lines = String::from_utf8(output.stdout)?;
-    let programs = lines.lines().filter_map(|line| {
+    let mut programs = lines.lines().filter_map(|line| {
         let message: serde_json::Value = serde_json::from_str(line).ok()?;
         Some(PathBuf::from(message["executable"].as_str()?))
     });
-    programs.last().ok_or_else(|| "cargo names no program".into())
+    programs.next_back().ok_or_else(|| "cargo names no program".into())
 }
