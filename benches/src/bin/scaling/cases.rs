@@ -138,10 +138,14 @@ fn recordings() -> [Case; 5] {
             flight::write(folder, n, 0)?;
             Ok(words("info flight"))
         }),
-        case("`info` of a bag", "frames of tf in a chain", |folder, n, _| {
-            bags::write_chain(&folder.join("run.bag"), n)?;
-            Ok(words("info run.bag"))
-        }),
+        Case {
+            // `tf/roots.rs` of the adapter counts its steps in a test.
+            reason: Some("no step is repeated, but maps of names outgrow the caches"),
+            ..case("`info` of a bag", "frames of tf in a chain", |folder, n, _| {
+                bags::write_chain(&folder.join("run.bag"), n)?;
+                Ok(words("info run.bag"))
+            })
+        },
         case("`info` of a bag", "topics", |folder, n, _| {
             bags::write_topics(&folder.join("run.bag"), n)?;
             Ok(words("info run.bag"))
