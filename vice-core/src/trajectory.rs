@@ -4,6 +4,10 @@
 //! and unit quaternions. Between two poses position goes linearly and rotation by slerp; across a gap wider than
 //! `max_gap`, before the first and after the last pose there is no pose, and the answer says which of these it was.
 
+mod builder;
+
+pub use builder::TrajectoryBuilder;
+
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::frames::{Body, FrameError, Rigid, World, WorldFromBody};
@@ -151,14 +155,11 @@ impl Trajectory {
     /// # Errors
     /// [`TrajectoryError`] with the row (from 0) that is not finite, not a unit quaternion, duplicate or out of order.
     pub fn from_rows(rows: impl IntoIterator<Item = PoseRow>) -> Result<Self, TrajectoryError> {
-        let rows = rows.into_iter();
-        let mut trajectory = Self::with_capacity(rows.size_hint().0);
-        for (row, r) in rows.enumerate() {
-            let pose = Rigid::try_from_parts(r.position_m, r.rotation_wxyz)
-                .map_err(|problem| TrajectoryError::Pose { row, problem })?;
-            trajectory.push(row, r.stamp, pose)?;
+        let mut builder = TrajectoryBuilder::default();
+        for row in rows {
+            builder.push(&row)?;
         }
-        trajectory.finish()
+        builder.finish()
     }
 
     /// A trajectory from poses.
@@ -220,6 +221,11 @@ impl Trajectory {
         self.stamps.push(stamp);
         self.poses.push(pose);
         Ok(())
+    }
+
+    /// Its stamps and poses.
+    pub(crate) fn into_parts(self) -> (Vec<Stamp>, Vec<WorldFromBody>) {
+        (self.stamps, self.poses)
     }
 
     fn finish(self) -> Result<Self, TrajectoryError> {

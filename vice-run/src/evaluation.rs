@@ -4,7 +4,7 @@ use vice_core::depth::DepthSource;
 use vice_core::evaluate::{EvaluateError, Evaluation, SampleSink, Selection, evaluate, evaluate_streaming};
 use vice_core::label::LabelSet;
 use vice_core::suspicion::Suspicions;
-use vice_files::address;
+use vice_files::{address, labels};
 
 use crate::error::{Context, RunError, RunResult};
 use crate::open::Opened;
@@ -50,7 +50,11 @@ impl LabelsSpec {
             Some(labels) => (labels.clone(), Suspicions::new()),
             None => {
                 let place = Place::of_file(&self.file)?;
-                let file = place.told(vice_files::labels::read_file(place.path(), Some(&opened.frames)))?;
+                let frames = Some(&*opened.frames);
+                let file = place.told(match self.points.as_slice() {
+                    [] => labels::read_file(place.path(), frames),
+                    points => labels::read_points(place.path(), frames, points),
+                })?;
                 let shown = address::shown_path(&self.file);
                 file.check_image_size(opened.camera.width(), opened.camera.height())
                     .map_err(|e| e.at(shown))?;
@@ -58,7 +62,9 @@ impl LabelsSpec {
             }
         };
         tracing::info!("{} points with {} labels", labels.points().len(), labels.observation_count());
-        if self.points.is_empty() {
+        let are_chosen = labels.points().iter().all(|p| self.points.contains(&p.name));
+        let are_all = self.points.iter().all(|name| labels.points().iter().any(|p| p.name == *name));
+        if self.points.is_empty() || (are_chosen && are_all) {
             return Ok((labels, suspicions));
         }
         let chosen = labels.select(&self.points).map_err(|unknown| {

@@ -170,16 +170,21 @@ pub fn compare_in_memory(request: &TrajectoryRequest, memory: &InMemory) -> RunR
     let name = |spec: &EstimateSpec| own_name(&spec.to_string()).to_string();
     let names = (name(&request.reference), name(&request.estimate));
     // As evo: what the reference no longer has is not matched either.
-    let pairs = crop(&reference, request.t_start, request.t_end).context(|| names.0.clone()).and_then(|r| {
-        PosePairs::match_up(&r, &estimate, matching, request.t_offset)
+    let estimate_poses = estimate.len();
+    let reference = match (request.t_start, request.t_end) {
+        (None, None) => Ok(reference),
+        (start, end) => crop(&reference, start, end).context(|| names.0.clone()),
+    };
+    let pairs = reference.and_then(|reference| {
+        PosePairs::match_up_owned(reference, estimate, matching, request.t_offset)
             .context(|| format!("{} against {}", names.1, names.0))
     });
     // What was read may be why nothing fits.
-    let pairs = pairs.inspect_err(|_| vice_files::leniency::log(&suspicions))?;
+    let mut pairs = pairs.inspect_err(|_| vice_files::leniency::log(&suspicions))?;
     suspicions.extend(suspected(&pairs, &names.1));
     let transform = align(&pairs, request.align, request.n_to_align)
         .context(|| format!("alignment {} of {}", request.align.name(), names.1))?;
-    let mut pairs = transform.apply_to(&pairs);
+    transform.apply_in_place(&mut pairs);
     if let Some(plane) = request.project_to_plane {
         pairs = plane.project_pairs(&pairs);
     }
@@ -212,7 +217,7 @@ pub fn compare_in_memory(request: &TrajectoryRequest, memory: &InMemory) -> RunR
         rpe_problem,
         suspicions,
     };
-    Ok(Compared { document, estimate_poses: estimate.len(), pairs, transform })
+    Ok(Compared { document, estimate_poses, pairs, transform })
 }
 
 /// A trajectory as it was read.
@@ -278,8 +283,11 @@ impl TrajectoryRequest {
         }
         let mut suspicions = reference.suspicions;
         suspicions.extend(estimate.suspicions);
-        let estimate = cure(&self.estimate_as, &estimate.trajectory, Given::default())
-            .map_err(|e| RunError::from(e).of("estimate-as"))?;
+        let estimate = match self.estimate_as.as_slice() {
+            [] => estimate.trajectory,
+            meant => cure(meant, &estimate.trajectory, Given::default())
+                .map_err(|e| RunError::from(e).of("estimate-as"))?,
+        };
         Ok(Both { reference: reference.trajectory, estimate, suspicions })
     }
 

@@ -65,7 +65,12 @@ impl Leniency {
 
     /// A row was read, whatever becomes of it.
     pub fn row(&mut self) {
-        self.rows += 1;
+        self.rows(1);
+    }
+
+    /// So many rows were read.
+    pub fn rows(&mut self, count: u64) {
+        self.rows += count;
     }
 
     /// A row that holds no value, at a line: it is left out.

@@ -9,7 +9,7 @@ use vice_core::time::Stamp;
 use crate::container::{Locator, Message, Recording, Topic, Visitor, Want};
 use crate::doubts::DAMAGED;
 use crate::message::{PoseKind, camera_info, compressed_head, framed_pose, image_head, tf_message};
-use crate::namespaces::{self, Space};
+use crate::namespaces::Spaces;
 use crate::pixels::Packing;
 use crate::series::{Delays, ImageTopic, InfoTopic, PoseTopic};
 use crate::settings::Stamps;
@@ -25,7 +25,7 @@ pub(crate) struct Index {
     pub(crate) poses: BTreeMap<usize, PoseTopic>,
     pub(crate) infos: BTreeMap<usize, InfoTopic>,
     /// The tf of each namespace that has some.
-    pub(crate) spaces: Vec<Space>,
+    pub(crate) spaces: Spaces,
     /// The URDFs that robots published.
     pub(crate) descriptions: BTreeMap<usize, String>,
     pub(crate) delays: Delays,
@@ -69,11 +69,11 @@ enum Role {
 }
 
 impl Role {
-    fn of(topic: &Topic, spaces: &mut Vec<Space>) -> Self {
+    fn of(topic: &Topic, spaces: &mut Spaces) -> Self {
         let name = topic.name.as_str();
         match topic.kind.as_str() {
             "tf2_msgs/TFMessage" | "tf/tfMessage" => {
-                Self::Tf { fixed: name.ends_with("tf_static"), space: namespaces::of_topic(spaces, name) }
+                Self::Tf { fixed: name.ends_with("tf_static"), space: spaces.of_topic(name) }
             }
             "sensor_msgs/CameraInfo" => Self::Info,
             "std_msgs/String" if name.ends_with("robot_description") => Self::Description,
@@ -100,7 +100,7 @@ impl Index {
         match self.roles.get(&message.topic).copied().unwrap_or(Role::None) {
             Role::None => {}
             Role::Tf { fixed, space } => {
-                let (tf, delays) = (&mut self.spaces[space].tf, &mut self.delays);
+                let (tf, delays) = (&mut self.spaces.all[space].tf, &mut self.delays);
                 tf_message(r, |t| match fixed {
                     true => tf.fix_raw(t.header.frame, t.child, &t.parent_from_child),
                     false => {

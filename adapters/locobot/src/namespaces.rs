@@ -1,6 +1,8 @@
 //! The tf of several robots in one recording, such as `/robot1/tf` and `/robot2/tf`: each namespace is a tree of its own,
 //! and that of the camera is used.
 
+use std::collections::HashMap;
+
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::suspicion::Suspicion;
 
@@ -26,16 +28,24 @@ pub(crate) fn holds(space: &str, name: &str) -> bool {
     name.strip_prefix(space).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
 }
 
-/// The place of the namespace of a topic with tf, which is added where it is new.
-pub(crate) fn of_topic(spaces: &mut Vec<Space>, topic: &str) -> usize {
-    let name = namespace(topic);
-    let known = spaces.iter().position(|space| space.name == name);
-    let place = known.unwrap_or_else(|| {
-        spaces.push(Space { name: name.to_string(), ..Space::default() });
-        spaces.len() - 1
-    });
-    spaces[place].topics.push(topic.to_string());
-    place
+/// The namespaces so far.
+#[derive(Debug, Default)]
+pub(crate) struct Spaces {
+    pub(crate) all: Vec<Space>,
+    places: HashMap<String, usize>,
+}
+
+impl Spaces {
+    /// The place of the namespace of a topic with tf, which is added where it is new.
+    pub(crate) fn of_topic(&mut self, topic: &str) -> usize {
+        let name = namespace(topic);
+        let place = *self.places.entry(name.to_string()).or_insert_with(|| {
+            self.all.push(Space { name: name.to_string(), ..Space::default() });
+            self.all.len() - 1
+        });
+        self.all[place].topics.push(topic.to_string());
+        place
+    }
 }
 
 /// What says which robot is meant.
@@ -82,14 +92,8 @@ pub(crate) fn choose(mut spaces: Vec<Space>, asked: &Asked<'_>) -> DataResult<Ch
     if let Some(set) = asked.set {
         return set_by_name(spaces, set, &topics);
     }
-    let mut shared: Vec<String> = Vec::new();
-    for (i, space) in spaces.iter().enumerate() {
-        for other in &spaces[i + 1..] {
-            shared.extend(space.tf.contradicts(&other.tf).into_iter().map(str::to_string));
-        }
-    }
-    shared.sort_unstable();
-    shared.dedup();
+    let shared: Vec<String> =
+        TfBuilder::contradictions(spaces.iter().map(|s| &s.tf)).into_iter().map(str::to_string).collect();
     if shared.is_empty() {
         let tf = merge(spaces).unwrap_or_default();
         return Ok(Chosen { tf, ..Chosen::default() });
@@ -107,9 +111,9 @@ pub(crate) fn choose(mut spaces: Vec<Space>, asked: &Asked<'_>) -> DataResult<Ch
     spaces.sort_by_key(|s| (!holds(&s.name, &own_name), std::cmp::Reverse(s.name.len()), s.name.clone()));
     let mut left = Vec::new();
     for space in spaces {
-        match tf.contradicts(&space.tf).is_empty() {
-            true => tf.add_missing(space.tf),
-            false => left.extend(space.topics),
+        match tf.contradicts(&space.tf) {
+            false => tf.add_missing(space.tf),
+            true => left.extend(space.topics),
         }
     }
     left.sort_unstable();

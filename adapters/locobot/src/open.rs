@@ -175,7 +175,7 @@ fn choose_tf(
     doubts: &Doubts,
 ) -> DataResult<TfTree> {
     let asked = Asked { set: settings.get("tf_namespace"), camera_topic, camera_frame };
-    let mut chosen = namespaces::choose(std::mem::take(&mut index.spaces), &asked)?;
+    let mut chosen = namespaces::choose(std::mem::take(&mut index.spaces.all), &asked)?;
     doubts.say_all(chosen.doubt.take());
     if chosen.undecided.is_none() {
         let place = chosen.space.as_deref().or(camera_topic.map(namespaces::namespace)).unwrap_or_default();

@@ -5,8 +5,9 @@
 //! `odom -> base` at 50 Hz cannot be interpolated as one.
 
 mod build;
+mod roots;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::BTreeMap;
 
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::suspicion::Suspicion;
@@ -45,6 +46,8 @@ struct Edge {
 #[derive(Clone, Debug)]
 pub(crate) struct TfTree {
     edges: BTreeMap<String, Edge>,
+    /// Children and parents, by name.
+    frames: Vec<String>,
     /// Oddities that were met while it was built, each kind once.
     pub(crate) notes: Vec<Suspicion>,
     /// Why no tf is used, where it comes from several robots and nothing says which is meant.
@@ -63,20 +66,20 @@ pub(crate) struct Chain<'a> {
 impl TfTree {
     /// All frames, by name.
     pub(crate) fn frames(&self) -> Vec<&str> {
-        let all = self.edges.iter().flat_map(|(child, edge)| [child.as_str(), edge.parent.as_str()]);
-        all.collect::<BTreeSet<_>>().into_iter().collect()
+        self.frames.iter().map(String::as_str).collect()
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.frames.binary_search_by(|frame| frame.as_str().cmp(name)).is_ok()
     }
 
     /// A frame by its name, or by its name behind a prefix such as `locobot/`, where only one fits.
     pub(crate) fn find(&self, name: &str) -> Option<String> {
-        let frames = self.frames();
-        if frames.contains(&name) {
+        if self.has(name) {
             return Some(name.to_string());
         }
-        let behind = format!("/{name}");
-        let mut fitting = frames.into_iter().filter(|f| f.ends_with(&behind));
-        match (fitting.next(), fitting.next()) {
-            (Some(frame), None) => Some(frame.to_string()),
+        match self.behind_prefixes(name)[..] {
+            [frame] => Some(frame.to_string()),
             _ => None,
         }
     }
@@ -84,7 +87,7 @@ impl TfTree {
     /// All frames of a name behind a prefix.
     pub(crate) fn behind_prefixes(&self, name: &str) -> Vec<&str> {
         let behind = format!("/{name}");
-        self.frames().into_iter().filter(|frame| frame.ends_with(&behind)).collect()
+        self.frames.iter().map(String::as_str).filter(|frame| frame.ends_with(&behind)).collect()
     }
 
     /// As [`TfTree::find`]; where several prefixes fit, the one that is `near`'s too, as of one robot of many.
@@ -93,7 +96,7 @@ impl TfTree {
             let mut prefix = near?;
             while let Some((outer, _)) = prefix.rsplit_once('/') {
                 let own = format!("{outer}/{name}");
-                if self.frames().contains(&own.as_str()) {
+                if self.has(&own) {
                     return Some(own);
                 }
                 prefix = outer;
@@ -158,7 +161,7 @@ impl TfTree {
         if target_root != source_root {
             let problem = format!("tf does not connect {target} and {source}");
             let frames = self.frames();
-            return Err(match [target, source].into_iter().find(|f| !frames.contains(f)) {
+            return Err(match [target, source].into_iter().find(|f| !self.has(f)) {
                 Some(unknown) => DataError::new(format!("{problem}: it has no frame {unknown}"))
                     .hint(format!("its frames: {}", list(&frames))),
                 None => DataError::new(format!(
@@ -180,25 +183,9 @@ impl TfTree {
 
     /// The frames on which nothing else hangs above, with the number of frames under each; sorted.
     pub(crate) fn roots(&self) -> DataResult<Vec<(String, usize)>> {
-        let mut roots: BTreeMap<&str, usize> = BTreeMap::new();
-        // The roots of frames that were met on the way up, so that each edge is gone up once.
-        let mut known: HashMap<&str, &str> = HashMap::new();
-        for frame in self.edges.keys() {
-            let (mut way, mut at): (Vec<&str>, &str) = (Vec::new(), frame);
-            let root = loop {
-                if let Some(root) = known.get(at) {
-                    break *root;
-                }
-                let Some(edge) = self.edges.get(at) else { break at };
-                if way.len() >= self.edges.len() {
-                    return Err(self.cycle(at));
-                }
-                way.push(at);
-                at = &edge.parent;
-            };
-            known.extend(way.into_iter().map(|frame| (frame, root)));
-            *roots.entry(root).or_default() += 1;
-        }
+        let parent = |frame: &str| self.edges.get(frame).map(|edge| edge.parent.as_str());
+        let children = self.edges.keys().map(String::as_str);
+        let roots = roots::count(children, parent).map_err(|frame| self.cycle(frame))?;
         Ok(roots.into_iter().map(|(root, n)| (root.to_string(), n)).collect())
     }
 

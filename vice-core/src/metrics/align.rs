@@ -84,6 +84,11 @@ impl ReferenceFromEstimate {
     pub fn apply_to(&self, pairs: &PosePairs) -> PosePairs {
         pairs.map_estimate(|pose| self.apply(pose))
     }
+
+    /// Puts the estimate of pairs into the reference's world.
+    pub fn apply_in_place(&self, pairs: &mut PosePairs) {
+        pairs.change_estimate(|pose| self.apply(pose));
+    }
 }
 
 /// The transform that aligns an estimate with its reference, from the first `n_to_align` pairs (`None`: all of them,

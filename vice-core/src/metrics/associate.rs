@@ -183,6 +183,34 @@ impl PosePairs {
         }
     }
 
+    /// As [`PosePairs::match_up`], in the memory of the trajectories where the nearest poses are taken.
+    ///
+    /// # Errors
+    /// As [`PosePairs::match_up`].
+    pub fn match_up_owned(
+        reference: Trajectory,
+        estimate: Trajectory,
+        matching: Matching,
+        t_offset: Span,
+    ) -> DataResult<Self> {
+        let Matching::Nearest { t_max_diff } = matching else {
+            return Self::match_up(&reference, &estimate, matching, t_offset);
+        };
+        let pairs = associate(&reference, &estimate, t_max_diff, t_offset)?;
+        let (mut stamps, mut reference) = reference.into_parts();
+        let (_, mut estimate) = estimate.into_parts();
+        // Both indices only grow, so that what is read lies at or behind what is written.
+        for (k, pair) in pairs.iter().enumerate() {
+            stamps[k] = stamps[pair.reference];
+            reference[k] = reference[pair.reference];
+            estimate[k] = estimate[pair.estimate];
+        }
+        stamps.truncate(pairs.len());
+        reference.truncate(pairs.len());
+        estimate.truncate(pairs.len());
+        Ok(Self { stamps, reference, estimate })
+    }
+
     /// Number of pairs, at least 1.
     #[expect(clippy::len_without_is_empty, reason = "pairs are never empty")]
     pub fn len(&self) -> usize {
@@ -217,6 +245,11 @@ impl PosePairs {
             reference: self.reference.clone(),
             estimate: self.estimate.iter().map(f).collect(),
         }
+    }
+
+    /// Changes each pose of the estimate.
+    pub(crate) fn change_estimate(&mut self, f: impl Fn(&WorldFromBody) -> WorldFromBody) {
+        self.estimate.iter_mut().for_each(|pose| *pose = f(pose));
     }
 
     /// The same pairs with each pose of both streams changed.
@@ -301,6 +334,28 @@ mod tests {
         assert_eq!(pairs(&[0], &[-2, 2], 10), [(0, 0)], "ties go to the earlier");
         assert_eq!(pairs(&[0, 4], &[2], 10), [(0, 0)], "ties go to the earlier");
         assert_eq!(pairs(&[0, 100], &[10, 89], 10), [(0, 0)], "the limit itself still matches");
+    }
+
+    proptest! {
+        #[test]
+        fn matching_in_place_is_matching(
+            reference in prop::collection::btree_set(0..300_i64, 1..60),
+            estimate in prop::collection::btree_set(0..300_i64, 1..60),
+            max in 0..8_i64,
+            offset in -5..5_i64,
+            interpolate in any::<bool>(),
+        ) {
+            let (r, e) = (at(reference), at(estimate));
+            let max = Span::from_nanos(max);
+            let matching = match interpolate {
+                true => Matching::Interpolate { max_gap: max },
+                false => Matching::Nearest { t_max_diff: max },
+            };
+            let offset = Span::from_nanos(offset);
+            let beside = PosePairs::match_up(&r, &e, matching, offset).map_err(|e| e.to_string());
+            let owned = PosePairs::match_up_owned(r, e, matching, offset).map_err(|e| e.to_string());
+            prop_assert_eq!(owned, beside);
+        }
     }
 
     #[test]

@@ -12,6 +12,7 @@ use crate::metrics::trajectory::{Statistics, relative_error};
 use crate::time::Span;
 
 mod pairs;
+mod turns;
 
 /// The most pairs that are compared (about 0.5 GB): all pairs by angle can be as many as n²/2.
 pub const MAX_PAIRS: usize = 1 << 24;
@@ -174,7 +175,8 @@ impl RpeErrors {
     ///   no pair where that is the pose itself, nor where `t + delta` is past the last pose by more than half of the
     ///   last time step.
     ///
-    /// Costs O(n log n), except all pairs by degrees: O(n²), in parallel, and refused above [`MAX_PAIRS`].
+    /// Costs O(n log n). All pairs by degrees cost, in parallel, what is found beside it, and what lies in the same
+    /// small ball of orientations as the bounds of the tolerance; more than [`MAX_PAIRS`] are refused.
     ///
     /// # Errors
     /// [`DataError`] if no two poses are that far apart, or more than [`MAX_PAIRS`] pairs are.

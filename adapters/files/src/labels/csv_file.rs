@@ -11,8 +11,8 @@ use super::csv_columns::Columns;
 use super::{LabelFile, label_error, no_labels, rounded};
 use crate::leniency::Leniency;
 
-const OCCLUDED: &str = "occluded";
-const UNCERTAIN: &str = "uncertain";
+pub(super) const OCCLUDED: &str = "occluded";
+pub(super) const UNCERTAIN: &str = "uncertain";
 
 /// Reads CSV with a heading. `source` is `manual` and `flags` empty where there are no such columns.
 ///
@@ -31,6 +31,11 @@ pub fn read_csv(bytes: &[u8]) -> DataResult<LabelSet> {
 /// # Errors
 /// As [`read_csv`].
 pub fn read_csv_file(bytes: &[u8]) -> DataResult<LabelFile> {
+    read_sifted(bytes, 0)
+}
+
+/// The same, of a file out of which so many rows were passed over that hold labels.
+pub(super) fn read_sifted(bytes: &[u8], passed: u64) -> DataResult<LabelFile> {
     let bytes = &*without_marks(bytes);
     // The reader's own trimming of fields allocates a record anew for each line.
     let mut csv = csv::ReaderBuilder::new()
@@ -45,7 +50,9 @@ pub fn read_csv_file(bytes: &[u8]) -> DataResult<LabelFile> {
     let mut labels = LabelSetBuilder::default();
     let mut lenient = Leniency::new();
     // Stamps of few digits, and the largest number of these.
-    let (mut rows, mut few, mut most_digits, mut kept) = (0_u64, 0_u64, 0, 0);
+    let (mut rows, mut few, mut most_digits) = (passed, 0_u64, 0);
+    let mut kept = usize::try_from(passed).unwrap_or(usize::MAX);
+    lenient.rows(passed);
     let mut record = csv::StringRecord::new();
     loop {
         let read = csv.read_record(&mut record);
@@ -108,7 +115,7 @@ fn without_marks(bytes: &[u8]) -> std::borrow::Cow<'_, [u8]> {
 }
 
 /// What stands between the names of the heading, as spreadsheets of some countries have it.
-fn delimiter(bytes: &[u8]) -> u8 {
+pub(super) fn delimiter(bytes: &[u8]) -> u8 {
     let is_heading = |line: &&[u8]| !line.trim_ascii().is_empty() && !line.starts_with(b"#");
     let heading = bytes.split(|b| *b == b'\n').find(is_heading).unwrap_or_default();
     match heading {

@@ -7,6 +7,7 @@
 //! | CVAT | "CVAT for video 1.1", tracks of points, of the annotation tool CVAT; counts frames, as the pickle does |
 //! | pickle | `{point: {frame index: (array([x, y]), is_keyframe)}}`, as the paper's authors stored them; read only |
 
+mod chosen;
 mod csv_columns;
 mod csv_file;
 mod cvat;
@@ -138,25 +139,72 @@ pub fn read_file(path: impl AsRef<Path>, frame_stamps: Option<&[Stamp]>) -> Data
     if let Some(what) = crate::not_text::what(&bytes) {
         return Err(crate::not_text::error(what).at(path));
     }
-    let file = match LabelFormat::of_content(&bytes) {
-        LabelFormat::Csv => read_csv_file(&bytes),
-        LabelFormat::Json => read_json(&bytes).map(LabelFile::of),
-        LabelFormat::Pickle => frame_stamps
-            .ok_or_else(|| counts_frames("a pickle"))
-            .and_then(|s| read_pickle(&bytes, s))
-            .map(LabelFile::of),
-        LabelFormat::Cvat => {
-            frame_stamps.ok_or_else(|| counts_frames("CVAT")).and_then(|s| read_cvat_file(&bytes, s))
-        }
-    };
-    let mut file = file.map_err(|e| e.at(path))?;
+    let file = parsed(&bytes, frame_stamps).map_err(|e| e.at(path))?;
     if let Some(frames) = frame_stamps {
         rounded::check(&file.labels, frames).map_err(|e| e.at(path))?;
     }
+    Ok(about(path, file))
+}
+
+/// As [`read_file`], of some points: memory and most of the time are those of these points where the file is a CSV without
+/// quotes, each point in time order. What looks wrong is said of the whole file.
+///
+/// # Errors
+/// As [`read_file`]. A name that is no point of the file is none: all its labels are returned then.
+pub fn read_points(
+    path: impl AsRef<Path>,
+    frame_stamps: Option<&[Stamp]>,
+    points: &[String],
+) -> DataResult<LabelFile> {
+    let path = path.as_ref();
+    if let Some(sifted) = chosen::sift(path, points, frame_stamps) {
+        let file = csv_file::read_sifted(&sifted.bytes, sifted.passed).map_err(|e| e.at(path))?;
+        let frames = frame_stamps.unwrap_or_default();
+        let stamps = || file.labels.points().iter().flat_map(|p| &p.observations).map(|o| o.stamp);
+        // Whether stamps were rounded is asked of all of them where none is at a frame.
+        if (sifted.at_a_frame || stamps().any(|s| frames.binary_search(&s).is_ok()))
+            && let Ok(file) = of_points(file, points)
+        {
+            return Ok(about(path, file));
+        }
+    }
+    let file = read_file(path, frame_stamps)?;
+    Ok(of_points(file, points).unwrap_or_else(|all| all))
+}
+
+/// The labels of some points; as they were where one is missing.
+fn of_points(file: LabelFile, points: &[String]) -> Result<LabelFile, LabelFile> {
+    let all = file.labels.points();
+    let are_there = points.iter().all(|name| all.iter().any(|p| p.name == *name));
+    if are_there && all.iter().all(|p| points.contains(&p.name)) {
+        return Ok(file);
+    }
+    match file.labels.select(points) {
+        Ok(labels) => Ok(LabelFile { labels, ..file }),
+        Err(_) => Err(file),
+    }
+}
+
+fn parsed(bytes: &[u8], frame_stamps: Option<&[Stamp]>) -> DataResult<LabelFile> {
+    match LabelFormat::of_content(bytes) {
+        LabelFormat::Csv => read_csv_file(bytes),
+        LabelFormat::Json => read_json(bytes).map(LabelFile::of),
+        LabelFormat::Pickle => frame_stamps
+            .ok_or_else(|| counts_frames("a pickle"))
+            .and_then(|s| read_pickle(bytes, s))
+            .map(LabelFile::of),
+        LabelFormat::Cvat => {
+            frame_stamps.ok_or_else(|| counts_frames("CVAT")).and_then(|s| read_cvat_file(bytes, s))
+        }
+    }
+}
+
+/// With the file named by what looks wrong.
+fn about(path: &Path, mut file: LabelFile) -> LabelFile {
     let about = path.display().to_string();
     let named = |s: Suspicion| if s.about.is_empty() { Suspicion { about: about.clone(), ..s } } else { s };
     file.suspicions = file.suspicions.into_iter().map(named).collect();
-    Ok(file)
+    file
 }
 
 fn counts_frames(what: &str) -> DataError {

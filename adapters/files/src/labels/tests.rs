@@ -342,3 +342,61 @@ fn labels_without_a_pixel_are_gaps_and_rounded_stamps_are_named() {
     let error = read(folder.path().join("a.csv"), None).unwrap_err().to_string();
     assert!(error.contains("ZIP archive (also .npz and .xlsx are)"), "{error}");
 }
+
+/// Lines of three points, ordinary and less so.
+fn any_line() -> impl Strategy<Value = (usize, i64, usize)> {
+    (0..3_usize, 1..5_i64, 0..60_usize)
+}
+
+proptest! {
+    #[test]
+    fn chosen_points_are_read_as_they_are_selected_from_the_whole(
+        lines in prop::collection::vec(any_line(), 1..30),
+        chosen in prop::sample::subsequence(vec!["a", "b 1", "c"], 1..3),
+        tabs in any::<bool>(),
+        known_frames in 0..3_usize,
+    ) {
+        let mut text = "point,timestamp_ns,u_px,v_px,keyframe,source,flags,more\n".to_string();
+        let mut stamp = 1_403_715_280_000_000_000_i64;
+        for (point, later, kind) in lines {
+            stamp += later;
+            let name = ["a", "b 1", "c"][point];
+            let row = match kind {
+                0 => "# a remark, by hand".to_string(),
+                1 => String::new(),
+                2 => format!("{name},{},1,2,0,,,", stamp - 3),
+                3 => format!("{name},{stamp},nan,2,0,,,"),
+                4 => format!("\"{name}\",{stamp},1,2,0,,,"),
+                5 => format!("{name},{stamp},1e3,+2,1,,,"),
+                6 => format!("{name},{stamp},1,2,0,auto,occluded+uncertain,x"),
+                7 => format!("{name},{stamp},1,2,0,auto\r"),
+                8 => format!("{name},{stamp},1,oops,0,,,"),
+                9 => format!("{name},{stamp},1,2,0,,,\r"),
+                10 => format!("{name},1.403715280E18,1,2,0,,,"),
+                11 => format!(",{stamp},1,2,0,,,"),
+                _ => format!(" {name} ,{stamp} , {}.25,-2,{},detected,,", kind, kind % 2),
+            };
+            text += &row;
+            text.push('\n');
+        }
+        if tabs {
+            text = text.replace(',', "\t");
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("labels.csv");
+        std::fs::write(&path, &text).unwrap();
+        let at_frame = Stamp::from_nanos(stamp);
+        let frames: Option<Vec<Stamp>> = [None, Some(vec![at_frame]), Some(vec![Stamp::from_nanos(7)])][known_frames].clone();
+        let points: Vec<String> = chosen.iter().map(|p| (*p).to_string()).collect();
+        let whole = read_file(&path, frames.as_deref());
+        let some = read_points(&path, frames.as_deref(), &points);
+        match (whole, some) {
+            (Ok(whole), Ok(some)) => {
+                let labels = whole.labels.select(&points).unwrap_or_else(|_| whole.labels.clone());
+                prop_assert_eq!(some, LabelFile { labels, ..whole });
+            }
+            (Err(whole), Err(some)) => prop_assert_eq!(whole.to_string(), some.to_string()),
+            (whole, some) => prop_assert!(false, "{whole:?} is not {some:?} of\n{text}"),
+        }
+    }
+}

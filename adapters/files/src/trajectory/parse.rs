@@ -6,7 +6,7 @@ use std::path::Path;
 use vice_core::error::{DataError, DataResult};
 use vice_core::suspicion::Suspicions;
 use vice_core::time::Stamp;
-use vice_core::trajectory::{PoseRow, Trajectory};
+use vice_core::trajectory::{PoseRow, Trajectory, TrajectoryBuilder};
 
 use super::layout::{self, Layout, Places, PoseLayout};
 use super::matrix::{MatrixCollector, MatrixPoses};
@@ -48,13 +48,15 @@ pub struct PoseRows {
 /// [`DataError`] with path and line, as [`super::read`].
 pub fn read_micros_rows(path: &Path) -> DataResult<PoseRows> {
     let read = |rows| {
-        let (collected, lenient) = gather(rows, Places::Blackbird)?;
-        let Collected::Poses(poses) = collected else {
-            return Err(DataError::new("the rows have no stamps"));
-        };
-        lenient.check(poses.poses.len(), "pose")?;
-        let suspicions = lenient.suspicions(&path.display().to_string());
-        Ok(PoseRows { rows: poses.poses, lines: poses.lines, suspicions })
+        let (collected, lenient) = gather(rows, Places::Blackbird, || Kept::Rows(Vec::new(), Vec::new()))?;
+        if let Collected::Poses(poses) = collected
+            && let Kept::Rows(rows, lines) = poses.kept
+        {
+            lenient.check(rows.len(), "pose")?;
+            let suspicions = lenient.suspicions(&path.display().to_string());
+            return Ok(PoseRows { rows, lines, suspicions });
+        }
+        Err(DataError::new("the rows have no stamps"))
     };
     crate::rows::open(path).and_then(read).map_err(|e| e.at(path))
 }
@@ -68,18 +70,22 @@ pub(super) fn read_euroc_rows<R: BufRead>(rows: Rows<R>) -> DataResult<Trajector
 }
 
 fn collect<R: BufRead>(rows: Rows<R>, places: Places) -> DataResult<Parsed> {
-    let (collected, lenient) = gather(rows, places)?;
+    let (collected, lenient) = gather(rows, places, Kept::poses)?;
     collected.finish(lenient)
 }
 
-fn gather<R: BufRead>(mut rows: Rows<R>, places: Places) -> DataResult<(Collected, Leniency)> {
+fn gather<R: BufRead>(
+    mut rows: Rows<R>,
+    places: Places,
+    kept: fn() -> Kept,
+) -> DataResult<(Collected, Leniency)> {
     let beginning = rows.begin()?;
     let mut lenient = Leniency::new();
     let mut collected: Option<Collected> = None;
     while let Some(row) = rows.next_row()? {
         let collected = match &mut collected {
             Some(collected) => collected,
-            None => collected.insert(Collected::new(layout::find(&beginning, &row, places)?)),
+            None => collected.insert(Collected::new(layout::find(&beginning, &row, places)?, kept())),
         };
         lenient.row();
         collected.push(&row, &mut lenient)?;
@@ -95,21 +101,21 @@ fn gather<R: BufRead>(mut rows: Rows<R>, places: Places) -> DataResult<(Collecte
 pub(super) fn first_is_pose<R: BufRead>(mut rows: Rows<R>) -> DataResult<bool> {
     let beginning = rows.begin()?;
     let Some(row) = rows.next_row()? else { return Ok(false) };
-    let mut collected = Collected::new(layout::find(&beginning, &row, Places::Shown)?);
+    let mut collected = Collected::new(layout::find(&beginning, &row, Places::Shown)?, Kept::poses());
     collected.push(&row, &mut Leniency::new())?;
     collected.finish(Leniency::new()).map(|_| true)
 }
 
 /// The rows so far, in the layout of the first.
 enum Collected {
-    Poses(PoseCollector),
+    Poses(Box<PoseCollector>),
     Matrices(MatrixCollector),
 }
 
 impl Collected {
-    const fn new(layout: Layout) -> Self {
+    fn new(layout: Layout, kept: Kept) -> Self {
         match layout {
-            Layout::Poses(layout) => Self::Poses(PoseCollector::new(layout)),
+            Layout::Poses(layout) => Self::Poses(Box::new(PoseCollector::new(layout, kept))),
             Layout::Matrices(rows) => Self::Matrices(MatrixCollector::new(rows)),
         }
     }
@@ -133,18 +139,47 @@ impl Collected {
     }
 }
 
+/// What rows become.
+enum Kept {
+    /// They stay as they are, each with its line.
+    Rows(Vec<PoseRow>, Vec<u64>),
+    /// Poses at once. What the core refuses is said once all rows were read, and are wrong in no other way.
+    Poses(TrajectoryBuilder, Option<DataError>),
+}
+
+impl Kept {
+    fn poses() -> Self {
+        Self::Poses(TrajectoryBuilder::default(), None)
+    }
+
+    fn push(&mut self, row: PoseRow, line: u64) {
+        match self {
+            Self::Rows(rows, lines) => {
+                rows.push(row);
+                lines.push(line);
+            }
+            Self::Poses(poses, refused @ None) => {
+                *refused = poses.push(&row).err().map(|e| DataError::new(e.problem()).line(line));
+            }
+            Self::Poses(..) => {}
+        }
+    }
+}
+
 struct PoseCollector {
     layout: PoseLayout,
-    poses: Vec<PoseRow>,
+    kept: Kept,
+    /// How many are kept, and the stamp of the last of them.
+    count: usize,
+    last_kept: Option<Stamp>,
     inertial: Vec<InertialRow>,
-    lines: Vec<u64>,
     /// Of the last row, kept or not.
     last: Option<Stamp>,
 }
 
 impl PoseCollector {
-    const fn new(layout: PoseLayout) -> Self {
-        Self { layout, poses: Vec::new(), inertial: Vec::new(), lines: Vec::new(), last: None }
+    const fn new(layout: PoseLayout, kept: Kept) -> Self {
+        Self { layout, kept, count: 0, last_kept: None, inertial: Vec::new(), last: None }
     }
 
     fn push(&mut self, row: &Row<'_>, lenient: &mut Leniency) -> DataResult<()> {
@@ -180,7 +215,7 @@ impl PoseCollector {
         }
         let stamp = self.layout.time.stamp(row)?;
         self.check_order(stamp, row, lenient)?;
-        if lenient.order(self.poses.last().map(|p| p.stamp), stamp, row.line())? == Order::Again {
+        if lenient.order(self.last_kept, stamp, row.line())? == Order::Again {
             return Ok(());
         }
         if let Some([velocity, gyro, accel]) = inertial {
@@ -195,8 +230,9 @@ impl PoseCollector {
             });
         }
         let rotation_wxyz = lenient.quaternion(rotation_wxyz, row.line());
-        self.poses.push(PoseRow { stamp, position_m, rotation_wxyz });
-        self.lines.push(row.line());
+        self.kept.push(PoseRow { stamp, position_m, rotation_wxyz }, row.line());
+        self.last_kept = Some(stamp);
+        self.count += 1;
         Ok(())
     }
 
@@ -210,9 +246,13 @@ impl PoseCollector {
     }
 
     fn finish(self, lenient: Leniency) -> DataResult<TrajectoryFile> {
-        lenient.check(self.poses.len(), "pose")?;
+        lenient.check(self.count, "pose")?;
         let columns = self.layout.passes_over.then_some(self.layout.width);
-        let trajectory = Trajectory::from_rows(self.poses).map_err(|e| at_line(&e, &self.lines))?;
+        let trajectory = match self.kept {
+            Kept::Poses(_, Some(refused)) => return Err(refused),
+            Kept::Poses(poses, None) => poses.finish().map_err(|e| at_line(&e, &[]))?,
+            Kept::Rows(rows, lines) => Trajectory::from_rows(rows).map_err(|e| at_line(&e, &lines))?,
+        };
         let mut file = TrajectoryFile::new(self.layout.format, trajectory);
         file.inertial = (!self.inertial.is_empty()).then_some(self.inertial);
         file.lenient = lenient;

@@ -89,6 +89,9 @@ fn bad_rows_are_named() {
     says(&format!("{good}1.5 0 0 0 0 0 0 1\n"), "t.txt:3: stamp 1500000000 ns is earlier");
     says(&format!("{good}3 0 0 0 0 0 0 2\n"), "t.txt:3: the quaternion has length 2");
     says(&format!("{good}3 0 0 0 0 0 0 0\n"), "t.txt:3: the quaternion has length 0");
+    // What the core refuses is said where nothing else is wrong.
+    says(&format!("{good}3 0 0 0 0 0 0 2\n4 x 0 0 0 0 0 1\n"), "t.txt:4: column 2");
+    says(&format!("{good}3 0 0 0 0 0 0 2\n4 0 0 0 0 0 0 1\n"), "t.txt:3: the quaternion has length 2");
     says(&format!("{good}3 0 0 0 0"), "t.txt:3: expected 8 columns, found 5: the last row is cut off");
     says(&format!("{good}3 0 0 0 0\n4 0 0 0 0 0 0 1\n"), "t.txt:3: expected 8 columns, found 5");
     says("1 2 3\n", "a row of 3 columns is no pose");

@@ -1,6 +1,6 @@
 //! Building the tree from transforms as they come, and noting what contradicts itself.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use vice_core::frames::rotation_angle_rad;
 use vice_core::suspicion::Suspicion;
@@ -100,12 +100,24 @@ impl TfBuilder {
         self.edges.contains_key(frame) || self.edges.values().any(|edge| edge.parent == frame)
     }
 
-    /// The frames that two builders hang differently: on other parents, or with transforms that are not the same.
-    pub(crate) fn contradicts(&self, other: &Self) -> Vec<&str> {
-        let differs =
-            |a: &Growing, b: &Growing| a.parent != b.parent || a.fixed != b.fixed || a.samples != b.samples;
-        let both = self.edges.iter().filter_map(|(child, a)| Some((child, a, other.edges.get(child)?)));
-        both.filter(|(_, a, b)| differs(a, b)).map(|(child, ..)| child.as_str()).collect()
+    /// Whether two builders hang a frame differently: on other parents, or with transforms that are not the same.
+    pub(crate) fn contradicts(&self, other: &Self) -> bool {
+        // Of many robots each adds little to what is there.
+        let (few, many) = if self.edges.len() < other.edges.len() { (self, other) } else { (other, self) };
+        few.edges.iter().any(|(child, a)| many.edges.get(child).is_some_and(|b| a.differs(b)))
+    }
+
+    /// The frames that any two of several builders hang differently.
+    pub(crate) fn contradictions<'a>(all: impl Iterator<Item = &'a Self>) -> BTreeSet<&'a str> {
+        let mut first: HashMap<&str, &Growing> = HashMap::new();
+        let mut found = BTreeSet::new();
+        for (child, edge) in all.flat_map(|builder| &builder.edges) {
+            // Where any two differ, one of them differs from the first.
+            if first.entry(child).or_insert(edge).differs(edge) {
+                found.insert(child.as_str());
+            }
+        }
+        found
     }
 
     /// Adds the edges of another builder that this one does not have.
@@ -129,11 +141,20 @@ impl TfBuilder {
                 edges.insert(child, Edge { parent, motion });
             }
         }
-        TfTree { edges, notes: notes.all(&nonsense), undecided: None }
+        let all = edges.iter().flat_map(|(child, edge): (&String, &Edge)| [child, &edge.parent]);
+        let mut frames: Vec<String> = all.cloned().collect();
+        frames.sort_unstable();
+        frames.dedup();
+        TfTree { edges, frames, notes: notes.all(&nonsense), undecided: None }
     }
 }
 
 impl Growing {
+    /// Whether it is another edge, or moves otherwise.
+    fn differs(&self, other: &Self) -> bool {
+        self.parent != other.parent || self.fixed != other.fixed || self.samples != other.samples
+    }
+
     fn fix(&mut self, transform: Transform) {
         let differs = |before: Transform| {
             let change = before.inverse() * transform;

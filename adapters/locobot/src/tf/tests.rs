@@ -89,6 +89,40 @@ fn cycles_and_disconnected_frames_are_named() {
 }
 
 #[test]
+fn a_chain_of_thousands_of_frames_is_one_way() {
+    let mut builder = TfBuilder::default();
+    (0..4000).for_each(|i| builder.fix(&format!("f{i}"), &format!("f{}", i + 1), at(1.0, 0.0)));
+    let long = builder.finish();
+    assert_eq!(long.roots().unwrap(), [("f0".to_string(), 4000)]);
+    let way = long.chain("f0", "f4000").unwrap().at(ms(0)).unwrap();
+    assert_eq!(way.translation().x, 4000.0);
+    let mut builder = TfBuilder::default();
+    (0..4000).for_each(|i| builder.fix(&format!("f{i}"), &format!("f{}", (i + 1) % 4000), at(1.0, 0.0)));
+    let ring = builder.finish();
+    let [one, other] =
+        [ring.roots().unwrap_err(), ring.chain("f3", "f4").unwrap_err()].map(|e| e.to_string());
+    assert!(one == other && one.contains("cycle") && one.contains("(4000 frames)"), "{one}");
+}
+
+#[test]
+fn frames_that_any_two_builders_hang_differently_are_found() {
+    let of = |edges: &[(&str, &str, f64)]| {
+        let mut builder = TfBuilder::default();
+        edges.iter().for_each(|(parent, child, x)| builder.fix(parent, child, at(*x, 0.0)));
+        builder
+    };
+    let first = of(&[("odom", "base", 1.0), ("base", "camera", 1.0), ("base", "arm", 1.0)]);
+    let same = of(&[("base", "camera", 1.0)]);
+    let other = of(&[("base", "camera", 1.0), ("base", "arm", 2.0), ("map", "base", 1.0)]);
+    let found: Vec<&str> =
+        TfBuilder::contradictions([&first, &same, &other].into_iter()).into_iter().collect();
+    assert_eq!(found, ["arm", "base"]);
+    assert!(first.contradicts(&other) && other.contradicts(&first));
+    assert!(!first.contradicts(&same) && !same.contradicts(&other));
+    assert!(TfBuilder::contradictions([&first, &same].into_iter()).is_empty());
+}
+
+#[test]
 fn oddities_are_noted() {
     let mut builder = TfBuilder::default();
     builder.fix("a", "b", at(1.0, 0.0));

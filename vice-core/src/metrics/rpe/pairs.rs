@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use crate::parallel::*;
 use nalgebra::UnitQuaternion;
 
+use super::turns::{Band, Turns};
 use super::{ALL_PAIRS_TOLERANCE, Delta, DeltaUnit, MAX_PAIRS, PairMode, PairsFrom, RpeOptions};
 use crate::error::{DataError, DataResult};
 use crate::frames::{WorldFromBody, rotation_angle_rad};
@@ -122,36 +123,25 @@ fn all_by_path(steps: &[f64], delta: f64) -> Pairs {
         .collect()
 }
 
-fn angle_between(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>) -> f64 {
+pub(super) fn angle_between(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>) -> f64 {
     rotation_angle_rad(&(a.inverse() * b))
 }
 
 /// Every two poses whose orientations are `degrees` apart, within the tolerance; at most `limit`.
 ///
-/// There is no order to search in: O(n²), shared among threads row by row. The result does not depend on their number.
+/// Shared among threads row by row. The result does not depend on their number.
 pub(super) fn all_by_angle(
     rotations: &[UnitQuaternion<f64>],
     degrees: f64,
     limit: usize,
 ) -> DataResult<Pairs> {
     let (delta, tolerance) = (degrees.to_radians(), (degrees * ALL_PAIRS_TOLERANCE).to_radians());
-    let (lower, upper) = (delta - tolerance, delta + tolerance);
-    // Most are decided by the cosine of half the angle, which is a mere dot product. What is within rounding of the
-    // bounds is decided by the angle itself.
-    let margin = 1e-12;
-    let most = (lower / 2.0).cos() + margin;
-    let least = (upper.min(std::f64::consts::PI) / 2.0).cos() - margin;
+    let turns = Turns::new(rotations, Band::new(delta - tolerance, delta + tolerance));
     let found = AtomicUsize::new(0);
     let rows: Option<Vec<Vec<usize>>> = (0..rotations.len())
         .into_par_iter()
         .map(|i| {
-            let a = &rotations[i];
-            let matches = |j: &usize| {
-                let b = &rotations[*j];
-                let cosine = a.coords.dot(&b.coords).abs();
-                (least..=most).contains(&cosine) && (lower..=upper).contains(&angle_between(a, b))
-            };
-            let row: Vec<usize> = (i + 1..rotations.len()).filter(matches).collect();
+            let row = turns.after(i);
             (found.fetch_add(row.len(), Ordering::Relaxed) + row.len() <= limit).then_some(row)
         })
         .collect();

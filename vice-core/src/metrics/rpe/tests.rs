@@ -157,4 +157,62 @@ proptest! {
         }
         prop_assert_eq!(pairs::all_by_angle(&rotations, degrees, 10_000).unwrap(), expected);
     }
+
+    #[test]
+    fn the_search_by_angle_is_the_double_loop_to_the_last_bit(
+        seed in 0_u64..1_000_000,
+        n in 2_usize..900,
+        // Of a heading, of a drone that tilts a little, of anything; standing still; and headings of whole steps, whose
+        // differences lie on the bounds.
+        kind in 0..5,
+        degrees in prop::sample::select(vec![1e-3_f64, 0.7, 10.0, 40.0, 90.0, 163.63636363636365, 170.0, 180.0]),
+    ) {
+        let rotations = turning(seed, n, kind);
+        let mut expected = Vec::new();
+        let (delta, tolerance) = (degrees.to_radians(), (degrees * ALL_PAIRS_TOLERANCE).to_radians());
+        for i in 0..n {
+            for j in i + 1..n {
+                let angle = rotation_angle_rad(&(rotations[i].inverse() * rotations[j]));
+                if (delta - tolerance..=delta + tolerance).contains(&angle) {
+                    expected.push((i, j));
+                }
+            }
+        }
+        prop_assert_eq!(pairs::all_by_angle(&rotations, degrees, usize::MAX).unwrap(), expected);
+    }
+}
+
+/// Orientations along a path.
+fn turning(seed: u64, n: usize, kind: i32) -> Vec<UnitQuaternion<f64>> {
+    let mut numbers = crate::random::Congruential::new(seed);
+    let mut at = Vector3::zeros();
+    let turns = (0..n).map(|i| {
+        let mut draw = |size: f64| Vector3::from_fn(|_, _| numbers.uniform(-size, size));
+        let rotation = match kind {
+            0 => {
+                at += Vector3::z() * draw(0.2).x;
+                at
+            }
+            1 => {
+                at += Vector3::z() * draw(0.2).x;
+                at + draw(0.05)
+            }
+            2 => draw(3.0),
+            3 => Vector3::repeat(0.3),
+            _ => Vector3::z() * (9.0 * (i % 41) as f64).to_radians(),
+        };
+        let turn = UnitQuaternion::from_scaled_axis(rotation);
+        // Both signs are the same orientation.
+        if i % 3 == 0 { UnitQuaternion::new_unchecked(-turn.into_inner()) } else { turn }
+    });
+    turns.collect()
+}
+
+#[test]
+fn poses_that_match_none_are_not_looked_at() {
+    // With the double loop two million poses would take half an hour here.
+    let turns: Vec<_> = (0..2_000_000)
+        .map(|i| UnitQuaternion::from_scaled_axis(Vector3::z() * (f64::from(i) * 0.001).sin()))
+        .collect();
+    assert_eq!(pairs::all_by_angle(&turns, 170.0, 0).unwrap(), []);
 }
