@@ -4,8 +4,9 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use pyo3::prelude::*;
+use vice_run::batch::FleetTable as Table;
 use vice_run::batch::collect::{Format as FileFormat, collect as collect_store};
-use vice_run::batch::fleet_table::{FleetTable as Table, Format};
+use vice_run::batch::fleet_table::Format;
 use vice_run::batch::scan::scan as scan_folder;
 use vice_run::batch::{Keep, Manifest, Options, Shard, State, Store, plan as plan_batch, run as run_batch};
 use vice_run::columns::HAS_PARQUET;

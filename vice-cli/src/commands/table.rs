@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use vice_run::batch::fleet_table::{FleetTable, Format};
+use vice_run::batch::FleetTable;
+use vice_run::batch::fleet_table::Format;
 
 use crate::terminal::{self, Outcome};
 

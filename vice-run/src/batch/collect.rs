@@ -7,12 +7,13 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 use vice_files::atomic::{self, Overwrite};
 
+use super::beside::Beside;
 use super::content::hex;
-use super::fleet_table::{self, Beside, render};
+use super::fleet_table::{self, render};
 use super::key::Key;
 use super::results::{ResultRow, SCHEMA};
 use super::results_file::{results_csv, to_csv, write_parquet};
-use super::samples::{self, PartSamples};
+use super::samples::{self, Samples};
 use super::store::{RowRecord, Store};
 use crate::columns::{self, Values};
 use crate::error::{RunError, RunResult};
@@ -84,27 +85,6 @@ pub fn collect(store: &Store) -> RunResult<Collected> {
         }
     }
     Ok(collected)
-}
-
-/// Where samples come from.
-#[derive(Clone, Copy)]
-pub(super) enum Samples<'a> {
-    /// Nowhere: there is only a table of results.
-    None,
-    /// The folder of a batch, where they were kept.
-    Store(&'a Store),
-}
-
-impl Samples<'_> {
-    /// The samples of a run; nothing where they were not kept or cannot be read.
-    pub(super) fn of(&self, key: &str) -> Option<Vec<PartSamples>> {
-        let Self::Store(store) = self else { return None };
-        // A table of results may have been written by anybody: its keys are no paths.
-        if !key.chars().all(|c| c.is_ascii_alphanumeric() || c == '-') {
-            return None;
-        }
-        samples::read(&store.samples_path(&Key::named(key))).ok()
-    }
 }
 
 /// What a table of a batch is written as.

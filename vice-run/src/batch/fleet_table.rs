@@ -1,14 +1,10 @@
 //! The table of many flights, in the shape of the paper's Table 1.
 
-use std::path::Path;
-
-use super::collect::{Samples, collect};
+use super::beside::Beside;
 use super::grid::{Grid, HEADS, HELD, grid};
 use super::markup;
 use super::results::ResultRow;
-use super::results_file;
 use super::standings::Standings;
-use super::store::Store;
 use crate::error::RunResult;
 use crate::report::csv::{cell, finished};
 use crate::report::table::align;
@@ -25,54 +21,6 @@ pub enum Format {
     Csv,
     /// A page.
     Html,
-}
-
-/// The results of a batch, to be shown as a table.
-#[derive(Clone, Debug)]
-pub struct FleetTable {
-    rows: Vec<ResultRow>,
-    /// The folder of the batch, where the results lie in it.
-    store: Option<Store>,
-    links: String,
-}
-
-impl FleetTable {
-    /// Reads the folder of a batch, or a `results.csv` or `results.parquet`. One that lies in the folder of its batch has
-    /// the samples beside it.
-    ///
-    /// # Errors
-    /// [`RunError`](crate::error::RunError) if it is none of these, or broken.
-    pub fn open(path: &Path) -> RunResult<Self> {
-        let folder = if path.is_dir() { Some(path) } else { path.parent() };
-        let store = folder.map(Store::new).filter(|s| path.is_dir() || s.is_there());
-        let rows = match &store {
-            Some(store) if path.is_dir() => collect(store)?.rows,
-            _ => results_file::read(path)?,
-        };
-        let links = folder.map_or_else(String::new, |f| f.join("").display().to_string());
-        Ok(Self { rows, store, links })
-    }
-
-    /// The table.
-    ///
-    /// # Errors
-    /// [`RunError`](crate::error::RunError) if a text is none.
-    pub fn render(&self, format: Format) -> RunResult<String> {
-        let beside = Beside {
-            samples: self.store.as_ref().map_or(Samples::None, Samples::Store),
-            links: self.store.as_ref().filter(|s| s.has_reports()).map(|_| self.links.as_str()),
-        };
-        render(&self.rows, &beside, format)
-    }
-}
-
-/// What a table shows beside the numbers of its rows.
-#[derive(Clone, Copy)]
-pub(super) struct Beside<'a> {
-    /// Where the samples come from, which comparisons over flights need.
-    pub(super) samples: Samples<'a>,
-    /// Put before the links of a page to the reports, which lie in the batch's folder; `None` where there are none.
-    pub(super) links: Option<&'a str>,
 }
 
 /// The table of some results.
@@ -144,6 +92,8 @@ fn csv_text(grid: &Grid) -> RunResult<String> {
 mod tests {
     use super::*;
     use crate::report::testing::HOSTILE;
+
+    use crate::batch::samples::Samples;
 
     const ALONE: Beside<'_> = Beside { samples: Samples::None, links: None };
 

@@ -6,9 +6,8 @@ use vice_core::fleet::FlightErrors;
 use vice_core::result::Sample;
 use vice_core::time::Stamp;
 
-use super::collect::Samples;
 use super::results::ResultRow;
-use super::samples::PartSamples;
+use super::samples::{PartSamples, Samples};
 
 /// Points of a curve at most: what a small plot can show.
 const CURVE_POINTS: usize = 60;

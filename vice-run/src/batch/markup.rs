@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use maud::html;
 
-use super::fleet_table::Beside;
+use super::beside::Beside;
 use super::grid::{Grid, HEADS, HELD, Line};
 use super::multiples::multiples;
 use super::standings::Standings;

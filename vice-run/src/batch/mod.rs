@@ -4,11 +4,13 @@
 //! table of it, and [`fleet_table`] shows that as the paper's. The same manifest gives the same bytes on one machine, in
 //! shards, and after any interruption. `docs/fleet.md` describes the folder.
 
+mod beside;
 mod cells;
 pub mod collect;
 mod content;
 mod csv_rows;
 mod field;
+mod fleet;
 pub mod fleet_table;
 mod flights;
 mod glob;
@@ -29,6 +31,7 @@ mod store;
 mod toml_rows;
 
 pub use content::Hashes;
+pub use fleet::FleetTable;
 pub use key::Key;
 pub use manifest::{Manifest, Row};
 pub use run::{Event, Options, Planned, Shard, State, Summary, plan, run};

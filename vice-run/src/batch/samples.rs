@@ -11,6 +11,8 @@ use vice_core::evaluate::SampleSink;
 use vice_core::result::{PointName, Sample};
 use vice_core::time::Stamp;
 
+use super::key::Key;
+use super::store::Store;
 use crate::columns::{self, Column, Values};
 use crate::error::RunResult;
 use crate::result::ResultDocument;
@@ -132,6 +134,27 @@ pub(super) fn read(path: &Path) -> DataResult<Vec<PartSamples>> {
         same
     });
     Ok(parts)
+}
+
+/// Where samples come from.
+#[derive(Clone, Copy)]
+pub(super) enum Samples<'a> {
+    /// Nowhere: there is only a table of results.
+    None,
+    /// The folder of a batch, where they were kept.
+    Store(&'a Store),
+}
+
+impl Samples<'_> {
+    /// The samples of a run; nothing where they were not kept or cannot be read.
+    pub(super) fn of(&self, key: &str) -> Option<Vec<PartSamples>> {
+        let Self::Store(store) = self else { return None };
+        // A table of results may have been written by anybody: its keys are no paths.
+        if !key.chars().all(|c| c.is_ascii_alphanumeric() || c == '-') {
+            return None;
+        }
+        read(&store.samples_path(&Key::named(key))).ok()
+    }
 }
 
 /// The columns of a table of samples, all of one length.

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use vice_core::fleet::{FEWEST_TO_RANK, FleetDifference, FlightErrors, Standing, difference, ranking};
 use vice_core::statistics::WithInterval;
 
-use super::collect::Samples;
 use super::flights::{Curve, Flight, flights};
 use super::results::ResultRow;
+use super::samples::Samples;
 use crate::report::difference::{interval, verdict};
 use crate::report::table::align;
 use crate::text::printable;

@@ -1,8 +1,7 @@
 //! Many points at once, in structure-of-arrays form.
 //!
 //! The single-point functions are the definition; these give the same numbers for slices, without allocating, as fast
-//! as memory brings the points ([`crate::lanes`] says how). Pinhole and Brown's models are equal to the last bit;
-//! `equidistant` is within 1e-12, since its arc tangent is not that of the standard library.
+//! as memory brings the points ([`crate::lanes`] says how), equal to the last bit.
 //!
 //! Slices hold `f64` or `f32` ([`Element`]).
 
