@@ -24,6 +24,22 @@ const USUAL_FRAMES: f64 = 300.0;
 /// Longest step of a size's logarithm.
 const LONGEST_SIZE_STEP: f64 = 0.8;
 
+/// Scores of frames that differ by less than this share of their squares are all alike.
+const ALIKE: f64 = 0.1;
+
+/// The scores of frames, of which the squares tell how sharp the likelihood is. Where they are all alike, as those of the
+/// labels' noise are where all labels are far nearer than it, that is slope and no sharpness, and would shorten each step to
+/// an eighth: then only how they differ is left.
+fn unlike(scores: Vec<f64>) -> Vec<f64> {
+    let count = scores.len().max(1) as f64;
+    let mean = scores.iter().sum::<f64>() / count;
+    let squares: f64 = scores.iter().map(|s| s * s).sum();
+    match squares - count * mean * mean < ALIKE * squares {
+        true => scores.into_iter().map(|s| s - mean).collect(),
+        false => scores,
+    }
+}
+
 /// What hypotheses are fitted to.
 pub(super) struct Work<'s, 'a> {
     pub(super) scene: &'s Scene<'a>,
@@ -284,10 +300,7 @@ impl Work<'_, '_> {
                         .zip(&frames)
                         .map(|(a, b)| (a - b) / SIZE_STEP)
                         .collect();
-                    // How the frames differ tells how sharp the likelihood is. What they share is slope: where all labels
-                    // are nearer than their noise, it would pass for sharpness and shorten each step to an eighth.
-                    let mean = scores.iter().sum::<f64>() / scores.len().max(1) as f64;
-                    (slope, scores.into_iter().map(|s| s - mean).collect())
+                    (slope, unlike(scores))
                 })
                 .collect();
             let n = free.len();

@@ -5,10 +5,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use crate::parallel::*;
 use nalgebra::UnitQuaternion;
 
-use super::turns::{Band, Turns};
+use super::turns::{Band, Turns, angle_between};
 use super::{ALL_PAIRS_TOLERANCE, Delta, DeltaUnit, MAX_PAIRS, PairMode, PairsFrom, RpeOptions};
 use crate::error::{DataError, DataResult};
-use crate::frames::{WorldFromBody, rotation_angle_rad};
+use crate::frames::WorldFromBody;
 use crate::metrics::associate::PosePairs;
 use crate::time::{Span, Stamp};
 
@@ -121,10 +121,6 @@ fn all_by_path(steps: &[f64], delta: f64) -> Pairs {
             (best < path.len() && off(i, best) <= tolerance).then_some((i, best))
         })
         .collect()
-}
-
-pub(super) fn angle_between(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>) -> f64 {
-    rotation_angle_rad(&(a.inverse() * b))
 }
 
 /// Every two poses whose orientations are `degrees` apart, within the tolerance; at most `limit`.

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{UnitQuaternion, Vector4};
 
-use super::pairs::angle_between;
+use crate::frames::rotation_angle_rad;
 
 /// As many orientations are not divided further.
 const LEAF: usize = 16;
@@ -17,6 +17,10 @@ const MARGIN: f64 = 1e-12;
 
 /// What is added to the radius of a ball for rounding, radians.
 const SLACK_RAD: f64 = 1e-9;
+
+pub(super) fn angle_between(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>) -> f64 {
+    rotation_angle_rad(&(a.inverse() * b))
+}
 
 /// The angles that are asked for, radians.
 #[derive(Clone, Copy, Debug)]
