@@ -45,7 +45,7 @@ pub struct Timing {
 /// Reads all results of a batch, one at a time.
 ///
 /// # Errors
-/// [`RunError`](crate::error::RunError) if the folder is none of a batch, or a file in it is broken.
+/// [`RunError`] if the folder is none of a batch, or a file in it is broken.
 pub fn collect(store: &Store) -> RunResult<Collected> {
     let mut collected = Collected::default();
     for listed in store.listed()?.rows {
@@ -104,7 +104,7 @@ impl Collected {
     /// Writes tables into the batch's folder; all that can go wrong before the first is written does.
     ///
     /// # Errors
-    /// [`RunError`](crate::error::RunError) if one cannot be made or written.
+    /// [`RunError`] if one cannot be made or written.
     pub fn write(&self, store: &Store, formats: &[Format]) -> RunResult<()> {
         let place = |name: &str| store.folder().join(name);
         let beside = Beside { samples: Samples::Store(store), links: store.has_reports().then_some("") };
@@ -140,7 +140,7 @@ impl Collected {
     /// apart before those of a sample. Returns how many.
     ///
     /// # Errors
-    /// [`RunError`](crate::error::RunError) if a run kept none, or a file cannot be written.
+    /// [`RunError`] if a run kept none, or a file cannot be written.
     pub fn write_samples(&self, store: &Store) -> RunResult<usize> {
         let mut runs: Vec<&ResultRow> = self.rows.iter().filter(|r| r.status == "done").collect();
         runs.dedup_by_key(|r| &r.run_id);
