@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use vice_run::report::comparison::{By, Document, NamedRun, csv, flight_count, latex, text};
+use vice_run::report::comparison::{By, Document, NamedRun, csv, latex, text};
 use vice_run::result;
 
 use crate::inputs::to_json;
@@ -56,7 +56,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     for path in &args.results {
         runs.push((run_name(path, &runs), result::read(path)?));
     }
-    let by = args.by.unwrap_or_else(|| default_by(&runs));
+    let by = args.by.unwrap_or_else(|| By::usual(&runs));
     let document = Document::of(&runs, by, args.seed, &|problem| tracing::warn!("{problem}"));
     if document.comparisons.is_empty() {
         let hint = match by {
@@ -98,14 +98,6 @@ fn fail_above(document: &Document, limit_px: Option<f64>) -> anyhow::Result<()> 
         ),
         None => Ok(()),
     }
-}
-
-fn default_by(runs: &[NamedRun]) -> By {
-    // One result of each recording: what is in it is compared.
-    let Some((_, only)) = runs.first().filter(|_| flight_count(runs) == runs.len()) else { return By::Runs };
-    let first = only.pixel.first();
-    let several = first.is_some_and(|f| only.pixel.iter().any(|p| p.stream != f.stream || p.role != f.role));
-    if several { By::Streams } else { By::Depths }
 }
 
 /// The file's name without its ending, told apart by a number where two are alike.

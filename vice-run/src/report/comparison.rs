@@ -28,9 +28,11 @@ pub enum By {
 }
 
 impl By {
-    /// What is compared where nothing is said: runs, else the streams of the only one, else its depth sources.
+    /// What is compared where nothing is said: runs; with one result of each recording its streams, or its depth sources
+    /// where there is one stream.
     pub fn usual(runs: &[NamedRun]) -> Self {
-        let [(_, only)] = runs else { return Self::Runs };
+        let alone = runs.first().filter(|_| flight_count(runs) == runs.len());
+        let Some((_, only)) = alone else { return Self::Runs };
         let first = only.pixel.first();
         let several =
             first.is_some_and(|f| only.pixel.iter().any(|p| p.stream != f.stream || p.role != f.role));
@@ -183,7 +185,7 @@ fn by_flight(runs: &[NamedRun]) -> Vec<Vec<&NamedRun>> {
 }
 
 /// How many different recordings the results are of.
-pub fn flight_count(runs: &[NamedRun]) -> usize {
+fn flight_count(runs: &[NamedRun]) -> usize {
     by_flight(runs).len()
 }
 
