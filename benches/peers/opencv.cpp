@@ -59,7 +59,8 @@ int main(int count, char** arguments) {
 
     emit("project", n, best_seconds(3, [&] { cv::projectPoints(points, none, none, k, d, out); }));
     emit("project moved", n, best_seconds(3, [&] { cv::projectPoints(points, rotation, translation, k, d, out); }));
-    const auto converged = cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 100, 1e-10);
+    // OpenCV's tolerance is in pixels: the same as 1e-10 in normalised coordinates.
+    const auto converged = cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 100, 1e-10 * k(0, 0));
     const auto undistort = [&] {
         cv::undistortPoints(pixels, out, k, d, cv::noArray(), cv::noArray(), converged);
     };

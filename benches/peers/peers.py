@@ -43,7 +43,8 @@ def opencv(n):
         return cv2.projectPoints(xyz.reshape(-1, 1, 3), rotation, translation, k, d)
 
     def unproject():
-        return cv2.undistortPoints(pixels, k, d, None, None, None, (3, 100, 1e-10)).reshape(-1, 2)
+        # OpenCV's tolerance is in pixels: the same as 1e-10 in normalised coordinates.
+        return cv2.undistortPoints(pixels, k, d, None, None, None, (3, 100, 1e-10 * k[0, 0])).reshape(-1, 2)
 
     emit("project moved", n, best_seconds(2, lambda: project(points)))
     emit("unproject", n, best_seconds(1, unproject))

@@ -51,7 +51,8 @@ pub(crate) fn dark(gray: &Gray) -> Vec<bool> {
         let line = &mut tiles[y / TILE * columns..(y / TILE + 1) * columns];
         for (tile, values) in line.iter_mut().zip(row.chunks(TILE)) {
             for v in values {
-                *tile = (tile.0.min(*v), tile.1.max(*v));
+                // Values are numbers: `min` would ask.
+                *tile = (if *v < tile.0 { *v } else { tile.0 }, if *v > tile.1 { *v } else { tile.1 });
             }
         }
     }
@@ -85,11 +86,17 @@ pub(crate) fn dark(gray: &Gray) -> Vec<bool> {
         .flat_map(|row| (0..columns).map(move |column| (column, row)))
         .map(|(c, r)| threshold(c, r))
         .collect();
-    let mut mask = Vec::with_capacity(w * h);
-    for (y, row) in gray.data.chunks_exact(w).enumerate() {
-        let line = &thresholds[y / TILE * columns..(y / TILE + 1) * columns];
-        for (t, values) in line.iter().zip(row.chunks(TILE)) {
-            mask.extend(values.iter().map(|v| v < t));
+    let mut mask = vec![false; w * h];
+    let mut limits = vec![0.0; columns * TILE];
+    for (y, (row, mask)) in gray.data.chunks_exact(w).zip(mask.chunks_exact_mut(w)).enumerate() {
+        if y % TILE == 0 {
+            let line = &thresholds[y / TILE * columns..(y / TILE + 1) * columns];
+            for (limits, t) in limits.chunks_exact_mut(TILE).zip(line) {
+                limits.fill(*t);
+            }
+        }
+        for ((dark, v), limit) in mask.iter_mut().zip(row).zip(&limits) {
+            *dark = v < limit;
         }
     }
     mask

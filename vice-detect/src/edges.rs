@@ -14,6 +14,11 @@ const LEFT_OUT: f64 = 0.1;
 /// Steps weaker than this are no edge, gray levels.
 const WEAKEST: f64 = 6.0;
 
+/// Between the places of a profile across a side, pixels.
+const STEP_PX: f64 = 0.25;
+/// A rise is taken over one pixel: so many places to both sides.
+const HALF_STEP: usize = 2;
+
 /// The corners of a dark quadrangle that is `cells` cells wide. `None` if a side has no edge or the corners run away.
 pub(crate) fn refine(gray: &Gray, quad: &Quad, cells: usize, camera: Option<&Camera>) -> Option<Quad> {
     let mut now = *quad;
@@ -60,23 +65,24 @@ fn edge_points(
     // Clockwise with y downwards: outside is to the left.
     let out = Vector2::new(along.y, -along.x);
     let count = (length.ceil() as usize).clamp(8, 64);
-    let steps = (reach / 0.25).round() as i32;
+    let steps = (reach / STEP_PX).round() as usize;
+    let mut profile = vec![0.0; 2 * (steps + HALF_STEP) + 1];
     let mut points = Vec::with_capacity(count);
     for k in 0..count {
         let part = LEFT_OUT + (1.0 - 2.0 * LEFT_OUT) * (k as f64 + 0.5) / count as f64;
         let on = a + (b - a) * part;
         let (mut weight, mut moment) = (0.0, 0.0);
-        for step in -steps..=steps {
-            let t = 0.25 * f64::from(step);
-            let at = |t: f64| {
-                let p = on + out * t;
-                gray.sample(p.x, p.y).map(f64::from)
-            };
-            let (Some(outer), Some(inner)) = (at(t + 0.5), at(t - 0.5)) else { continue };
-            let rise = (outer - inner).max(0.0);
+        // Each place once: the outer end of one step is the inner end of the fourth after it.
+        for (k, value) in profile.iter_mut().enumerate() {
+            let p = on + out * (STEP_PX * (k as f64 - (steps + HALF_STEP) as f64));
+            *value = gray.sample(p.x, p.y).map_or(f64::NAN, f64::from);
+        }
+        for (k, ends) in profile.windows(2 * HALF_STEP + 1).enumerate() {
+            // Not a number where an end lies outside the picture, which is no rise.
+            let rise = ends[2 * HALF_STEP] - ends[0];
             if rise > WEAKEST {
                 weight += rise * rise;
-                moment += rise * rise * t;
+                moment += rise * rise * (STEP_PX * (k as f64 - steps as f64));
             }
         }
         if weight > 0.0 {

@@ -8,86 +8,98 @@ const LEAST_SIDE: usize = 9;
 /// Four corners, clockwise as seen in the picture, good to a pixel or two.
 pub(crate) type Quad = [Vector2<f64>; 4];
 
-/// A patch: where it lies and how large it is.
+/// Dark pixels of one row that touch each other: from the first to the last.
 #[derive(Clone, Copy)]
-struct Patch {
+struct Run {
+    y: usize,
     x: [usize; 2],
-    y: [usize; 2],
-    area: usize,
+}
+
+/// Dark pixels that touch each other along rows and columns.
+struct Patch {
+    /// From the top, in a row from the left.
+    runs: Vec<Run>,
+}
+
+impl Patch {
+    fn x(&self) -> [usize; 2] {
+        self.runs.iter().fold([usize::MAX, 0], |x, run| [x[0].min(run.x[0]), x[1].max(run.x[1])])
+    }
+
+    fn y(&self) -> [usize; 2] {
+        [self.runs.first().map_or(0, |r| r.y), self.runs.last().map_or(0, |r| r.y)]
+    }
+
+    fn area(&self) -> usize {
+        self.runs.iter().map(|run| run.x[1] - run.x[0] + 1).sum()
+    }
+
+    /// Whether it can hold a tag: large enough, off the picture's border, and not a thin line.
+    fn can_be(&self, width: usize, height: usize) -> bool {
+        let (x, y) = (self.x(), self.y());
+        let (wide, high) = (x[1] - x[0] + 1, y[1] - y[0] + 1);
+        wide >= LEAST_SIDE
+            && high >= LEAST_SIDE
+            && x[0] > 0
+            && y[0] > 0
+            && x[1] + 1 < width
+            && y[1] + 1 < height
+            && self.area() * 8 > wide * high
+    }
 }
 
 /// Quadrangles among the dark patches of a picture, that do not touch its border.
 pub(crate) fn quads(dark: &[bool], width: usize) -> Vec<Quad> {
     let height = dark.len() / width.max(1);
-    let (labels, patches) = patches(dark, width);
-    patches
-        .iter()
-        .enumerate()
-        .filter(|(_, p)| {
-            let (wide, high) = (p.x[1] - p.x[0] + 1, p.y[1] - p.y[0] + 1);
-            wide >= LEAST_SIDE
-                && high >= LEAST_SIDE
-                && p.x[0] > 0
-                && p.y[0] > 0
-                && p.x[1] + 1 < width
-                && p.y[1] + 1 < height
-                && p.area * 8 > wide * high
-        })
-        .filter_map(|(label, patch)| quad(&labels, width, label as u32, patch))
-        .collect()
+    patches(dark, width).iter().filter(|patch| patch.can_be(width, height)).filter_map(quad).collect()
 }
 
-/// The patch of each dark pixel, by neighbours along rows and columns.
-fn patches(dark: &[bool], width: usize) -> (Vec<u32>, Vec<Patch>) {
-    const NONE: u32 = u32::MAX;
-    let mut labels = vec![NONE; dark.len()];
-    let mut parent: Vec<u32> = Vec::new();
-    fn root(parent: &mut [u32], mut label: u32) -> u32 {
-        while parent[label as usize] != label {
-            parent[label as usize] = parent[parent[label as usize] as usize];
-            label = parent[label as usize];
+/// The patches, in the order of their first pixels.
+fn patches(dark: &[bool], width: usize) -> Vec<Patch> {
+    let mut runs: Vec<Run> = Vec::new();
+    // Of each run one before it that it belongs to, or itself.
+    let mut parent: Vec<usize> = Vec::new();
+    fn root(parent: &mut [usize], mut run: usize) -> usize {
+        while parent[run] != run {
+            parent[run] = parent[parent[run]];
+            run = parent[run];
         }
-        label
+        run
     }
-    for at in 0..dark.len() {
-        if !dark[at] {
-            continue;
+    // The runs of the row above begin here.
+    let mut above = 0;
+    for (y, row) in dark.chunks_exact(width.max(1)).enumerate() {
+        let first = runs.len();
+        let (mut x, mut over) = (0, above);
+        while let Some(start) = row[x..].iter().position(|d| *d).map(|skip| x + skip) {
+            let end = row[start..].iter().position(|d| !*d).map_or(width, |length| start + length);
+            let this = runs.len();
+            runs.push(Run { y, x: [start, end - 1] });
+            parent.push(this);
+            while over < first && runs[over].x[1] < start {
+                over += 1;
+            }
+            let mut touching = over;
+            while touching < first && runs[touching].x[0] < end {
+                let (a, b) = (root(&mut parent, touching), root(&mut parent, this));
+                parent[a.max(b)] = a.min(b);
+                touching += 1;
+            }
+            x = end;
         }
-        let left = if at % width > 0 { labels[at - 1] } else { NONE };
-        let above = if at >= width { labels[at - width] } else { NONE };
-        labels[at] = match (left, above) {
-            (NONE, NONE) => {
-                parent.push(parent.len() as u32);
-                parent.len() as u32 - 1
-            }
-            (label, NONE) | (NONE, label) => label,
-            (a, b) if a == b => a,
-            (a, b) => {
-                let (a, b) = (root(&mut parent, a), root(&mut parent, b));
-                parent[a.max(b) as usize] = a.min(b);
-                a.min(b)
-            }
-        };
+        above = first;
     }
-    let mut number = vec![NONE; parent.len()];
+    let mut number = vec![usize::MAX; runs.len()];
     let mut patches: Vec<Patch> = Vec::new();
-    for (at, label) in labels.iter_mut().enumerate() {
-        if *label == NONE {
-            continue;
+    for (i, run) in runs.iter().enumerate() {
+        let root = root(&mut parent, i);
+        if number[root] == usize::MAX {
+            number[root] = patches.len();
+            patches.push(Patch { runs: Vec::new() });
         }
-        let root = root(&mut parent, *label) as usize;
-        let (x, y) = (at % width, at / width);
-        if number[root] == NONE {
-            number[root] = patches.len() as u32;
-            patches.push(Patch { x: [x, x], y: [y, y], area: 0 });
-        }
-        *label = number[root];
-        let patch = &mut patches[*label as usize];
-        patch.x = [patch.x[0].min(x), patch.x[1].max(x)];
-        patch.y[1] = y;
-        patch.area += 1;
+        patches[number[root]].runs.push(*run);
     }
-    (labels, patches)
+    patches
 }
 
 fn cross(a: Vector2<f64>, b: Vector2<f64>) -> f64 {
@@ -100,19 +112,14 @@ fn area(polygon: &[Vector2<f64>]) -> f64 {
 }
 
 /// The quadrangle that a patch's outline is, if it is one.
-fn quad(labels: &[u32], width: usize, label: u32, patch: &Patch) -> Option<Quad> {
+fn quad(patch: &Patch) -> Option<Quad> {
     // The outermost pixels of each row, by the corners of their areas.
     let mut points = Vec::new();
-    for y in patch.y[0]..=patch.y[1] {
-        let row = &labels[y * width + patch.x[0]..=y * width + patch.x[1]];
-        let (Some(left), Some(right)) =
-            (row.iter().position(|l| *l == label), row.iter().rposition(|l| *l == label))
-        else {
-            continue;
-        };
+    for row in patch.runs.chunk_by(|a, b| a.y == b.y) {
+        let ([first, ..], [.., last]) = (row, row) else { continue };
         for dy in [-0.5, 0.5] {
-            points.push(Vector2::new((patch.x[0] + left) as f64 - 0.5, y as f64 + dy));
-            points.push(Vector2::new((patch.x[0] + right) as f64 + 0.5, y as f64 + dy));
+            points.push(Vector2::new(first.x[0] as f64 - 0.5, first.y as f64 + dy));
+            points.push(Vector2::new(last.x[1] as f64 + 0.5, first.y as f64 + dy));
         }
     }
     let mut polygon = hull(points);
@@ -126,7 +133,7 @@ fn quad(labels: &[u32], width: usize, label: u32, patch: &Patch) -> Option<Quad>
     }
     let quad: Quad = polygon.try_into().ok()?;
     let inside = area(&quad);
-    let fill = patch.area as f64 / inside;
+    let fill = patch.area() as f64 / inside;
     let shortest = (0..4).map(|i| (quad[(i + 1) % 4] - quad[i]).norm()).fold(f64::MAX, f64::min);
     // A tag's border and dark cells are at least a third of it, and some cells are white.
     (inside > 0.8 * whole && shortest > 6.0 && (0.3..0.97).contains(&fill)).then_some(quad)

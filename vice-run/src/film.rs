@@ -16,6 +16,9 @@ use crate::report::marks::Marks;
 use crate::report::numbers::time_zero;
 use crate::result::ResultDocument;
 
+/// Drawn frames that wait to be written: enough that neither side waits for a slow frame of the other.
+const FRAMES_AHEAD: usize = 4;
+
 /// What is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Output<'a> {
@@ -87,7 +90,7 @@ impl Frames<'_> {
         })
     }
 
-    /// One frame after another in memory: decoded, drawn on, given away.
+    /// One frame after another: decoded and drawn on by one thread while another gives the last ones away.
     fn each(
         &self,
         progress: &Progress<'_>,
@@ -96,15 +99,34 @@ impl Frames<'_> {
         let camera = &self.document.dataset.camera;
         let stamps = self.dataset.frames(camera)?;
         let zero = time_zero(self.document);
-        for (count, stamp) in self.marks.frames.keys().enumerate() {
+        let draw = |stamp: Stamp| -> RunResult<(Stamp, Image)> {
             let index = stamps
-                .binary_search(stamp)
+                .binary_search(&stamp)
                 .map_err(|_| RunError::missing(format!("camera {camera} has no frame at {stamp} ns")))?;
             let image = self.dataset.image(camera, index)?;
-            give(count, *stamp, &film_frame::draw(&image, self.marks, *stamp, zero)?)?;
-            progress("drawing frames", count + 1, self.marks.frames.len());
-        }
-        Ok(self.marks.frames.len())
+            Ok((stamp, film_frame::draw(&image, self.marks, stamp, zero)?))
+        };
+        let (ready, drawn) = std::sync::mpsc::sync_channel(FRAMES_AHEAD);
+        std::thread::scope(|scope| {
+            scope.spawn(move || {
+                for stamp in self.marks.frames.keys() {
+                    let frame = draw(*stamp);
+                    let failed = frame.is_err();
+                    // Nobody listens any more where a frame could not be written.
+                    if ready.send(frame).is_err() || failed {
+                        return;
+                    }
+                }
+            });
+            let mut count = 0;
+            for frame in drawn {
+                let (stamp, image) = frame?;
+                give(count, stamp, &image)?;
+                count += 1;
+                progress("drawing frames", count, self.marks.frames.len());
+            }
+            Ok(count)
+        })
     }
 }
 

@@ -35,6 +35,9 @@ impl Equidistant {
 /// Below this radius the scale is 1 to the last bit, and the quotient of small numbers is not.
 const NEAR_AXIS: f64 = 1e-12;
 
+/// After a step so small (squared, radians) what is left is below rounding: it shrinks with the square.
+const LAST_STEP_SQUARED: f64 = 1e-16;
+
 impl Distortion for Equidistant {
     #[inline(always)]
     fn distort<N: Number>(&self, x: N, y: N) -> (N, N) {
@@ -62,13 +65,15 @@ impl Distortion for Equidistant {
         let rd2 = xd * xd + yd * yd;
         let rd = rd2.sqrt();
         let mut theta = rd * solve::seeded(seed, rd2);
-        theta = theta - (self.angle(theta) - rd) / self.angle_rate(theta);
+        if seed.more_steps {
+            theta = theta - (self.angle(theta) - rd) / self.angle_rate(theta);
+        }
         let step = (self.angle(theta) - rd) / self.angle_rate(theta);
         theta = theta - step;
+        let done = (step * step).at_most(rd.of(LAST_STEP_SQUARED));
         let r = theta.tan();
         let scale = N::select(rd.at_most(rd.of(NEAR_AXIS)), rd.of(1.0), r / rd);
-        let settled =
-            rd.both(rd2.at_most(rd.of(seed.max_rd2)), (step * step).at_most(rd.of(solve::LAST_STEP_SQUARED)));
+        let settled = rd.both(rd2.at_most(rd.of(seed.max_rd2)), done);
         let inside = rd.both(theta.below(rd.of(FRAC_PI_2)), r.at_most(rd.of(quick_radius)));
         (xd * scale, yd * scale, rd.both(settled, inside))
     }

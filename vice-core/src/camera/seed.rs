@@ -25,14 +25,15 @@ pub(crate) struct Seed {
     pub(super) scale: f64,
     /// Up to where it is good; zero where it is not at all.
     pub(super) max_rd2: f64,
-    /// Whether a third step is made everywhere: where the tangential part is so large that two would often not do.
-    pub(super) third_step: bool,
+    /// Whether a step more is made everywhere: where the tangential part is so large, or the polynomial so far off, that
+    /// the usual ones would often not do.
+    pub(super) more_steps: bool,
 }
 
 impl Seed {
     /// Good nowhere.
     pub(super) const NONE: Self =
-        Self { coefficients: [0.0; TERMS], scale: 0.0, max_rd2: 0.0, third_step: false };
+        Self { coefficients: [0.0; TERMS], scale: 0.0, max_rd2: 0.0, more_steps: false };
 
     /// For what grows from 0 to `rim` and is distorted by `radial`, over distorted radii up to `reach`.
     pub(super) fn fit(radial: impl Fn(f64) -> f64, rim: f64, reach: f64) -> Self {
@@ -81,7 +82,7 @@ impl Seed {
                 return None;
             }
         }
-        let found = Self { coefficients, scale: 2.0 / max_rd2, max_rd2, third_step: false };
+        let found = Self { coefficients, scale: 2.0 / max_rd2, max_rd2, more_steps: false };
         (coefficients.iter().all(|c| c.is_finite()) && found.scale.is_finite()).then_some(found)
     }
 }

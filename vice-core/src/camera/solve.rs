@@ -35,19 +35,15 @@ pub(super) fn undistort<D: Distortion>(
 }
 
 /// The seed of a lens for an image that reaches so far off the axis in x and y (distorted normalised coordinates), with a
-/// third step where two from it are too often not enough.
+/// step more where those from it are too often not enough.
 pub(super) fn seed_of<D: Distortion>(lens: &D, [reach_x, reach_y]: [f64; 2]) -> Seed {
     let seed = lens.seed(reach_x.hypot(reach_y));
     let quick_radius = quick_radius(lens.max_radius());
     let side = |i: u32| f64::from(i) / 8.0 - 1.0;
-    let (mut asked, mut missed) = (0, 0);
-    for (xd, yd) in (0..=16).flat_map(|i| (0..=16).map(move |j| (reach_x * side(i), reach_y * side(j)))) {
-        if xd * xd + yd * yd <= seed.max_rd2 {
-            asked += 1;
-            missed += u32::from(!lens.undistort_fast(&seed, quick_radius, (xd, yd)).2);
-        }
-    }
-    Seed { third_step: 20 * missed > asked, ..seed }
+    let grid = (0..=16).flat_map(|i| (0..=16).map(move |j| (reach_x * side(i), reach_y * side(j))));
+    let asked: Vec<(f64, f64)> = grid.filter(|(xd, yd)| xd * xd + yd * yd <= seed.max_rd2).collect();
+    let missed = asked.iter().filter(|place| !lens.undistort_fast(&seed, quick_radius, **place).2).count();
+    Seed { more_steps: 20 * missed > asked.len(), ..seed }
 }
 
 /// The radius up to which a fixed number of steps is trusted.
@@ -85,7 +81,7 @@ pub(super) fn in_the_plane<D: Distortion, N: Number>(
     let start = (x - scale * side_x, y - scale * side_y);
     let (x, y, _) = newton_step(lens, (xd, yd), start);
     let (mut x, mut y, mut step2) = newton_step(lens, (xd, yd), (x, y));
-    if seed.third_step {
+    if seed.more_steps {
         (x, y, step2) = newton_step(lens, (xd, yd), (x, y));
     }
     let settled = rd2.both(rd2.at_most(rd2.of(seed.max_rd2)), step2.at_most(rd2.of(LAST_STEP_SQUARED)));

@@ -123,9 +123,9 @@ pub struct Measurement {
     pub threads: usize,
     /// Points a second, best of many rounds.
     pub points_per_second: f64,
-    /// How near that is to the limit.
+    /// The time of what limits, measured in the same rounds, over that of the kernel; the least of each.
     pub fraction_of_limit: f64,
-    /// What limits.
+    /// What limits: copying as many bytes (`memory`), or reading those of the file.
     pub limit: &'static str,
 }
 
@@ -172,13 +172,13 @@ pub fn measure(options: &BenchOptions, progress: &Progress<'_>) -> RunResult<Ben
     for (done, (kernel, model)) in work.iter().enumerate() {
         progress("measuring", done, work.len());
         let mut measured = Work::new(*kernel, *model, options.points)?;
-        for (pool, machine) in pools.iter().zip(&document.machine) {
-            let best = pool.install(|| measured.measure(machine))?;
+        for pool in &pools {
+            let best = pool.install(|| measured.measure())?;
             document.results.push(Measurement {
                 kernel: *kernel,
                 model: *model,
                 points: options.points as u64,
-                threads: machine.threads,
+                threads: pool.current_num_threads(),
                 points_per_second: options.points as f64 / best.seconds,
                 fraction_of_limit: best.limit_seconds / best.seconds,
                 limit: best.limit,
@@ -205,12 +205,10 @@ pub fn render(document: &BenchDocument) -> String {
     let mut text = format!("instructions: {}\n", instruction_set());
     for m in &document.machine {
         text.push_str(&format!(
-            "limits with {} thread{}: memcpy {:.1} GB/s (read and written), {:.1}e9 multiply-adds/s, {:.2}e9 divisions/s\n",
+            "memcpy with {} thread{}: {:.1} GB/s (read and written)\n",
             m.threads,
             if m.threads == 1 { "" } else { "s" },
             m.memcpy_bytes_per_second / 1e9,
-            m.multiply_adds_per_second / 1e9,
-            m.divisions_per_second / 1e9,
         ));
     }
     text.push('\n');
@@ -244,13 +242,7 @@ mod tests {
             [KernelName::Project, KernelName::Unproject, KernelName::Track, KernelName::Zmap, KernelName::Ply]
         {
             for model in models(kernel, None) {
-                let machine = Machine {
-                    threads: 1,
-                    memcpy_bytes_per_second: 1e10,
-                    multiply_adds_per_second: 1e10,
-                    divisions_per_second: 1e9,
-                };
-                let measured = Work::new(kernel, model, 500).unwrap().measure(&machine).unwrap();
+                let measured = Work::new(kernel, model, 500).unwrap().measure().unwrap();
                 assert!(measured.seconds > 0.0 && measured.limit_seconds > 0.0, "{kernel:?} {model:?}");
             }
         }

@@ -15,7 +15,7 @@ use vice_core::time::Stamp;
 use vice_core::track::track_batch;
 use vice_depth::{Cloud, CloudOptions, ZMapDepth, ZMapOptions, depth_image, read_ply_points};
 
-use super::limits::{Machine, copy_bytes, seconds};
+use super::limits::{copy_bytes, seconds};
 use super::scan::room;
 use super::{KernelName, ModelName};
 use crate::error::{Context, RunResult};
@@ -23,9 +23,6 @@ use crate::error::{Context, RunResult};
 /// Measured until both are reached.
 const MIN_ROUNDS: usize = 5;
 const MIN_SECONDS: f64 = 0.5;
-/// Steps of Newton's method that the limit of undistortion counts: from the distorted point to the last bits, and one
-/// to see that they stay.
-const NEWTON_STEPS: f64 = 5.0;
 
 /// The best time, and the shortest that the machine allows.
 pub(super) struct Measured {
@@ -34,19 +31,10 @@ pub(super) struct Measured {
     pub(super) limit: &'static str,
 }
 
-/// Operations of a formula for one point. A square root costs what a division does.
-#[derive(Clone, Copy, Default)]
-struct Operations {
-    /// Sums and products; each takes a slot of the multiply-add units.
-    sums: f64,
-    divisions: f64,
-}
-
 /// Input and output of a kernel.
 pub(super) enum Work {
     Camera {
         kernel: KernelName,
-        model: ModelName,
         camera: Camera,
         input: [Vec<f64>; 3],
         output: [Vec<f64>; 2],
@@ -105,14 +93,7 @@ impl Work {
                 let ranges = if kernel == KernelName::Project { [x, y, z] } else { [u, v, z] };
                 let input = ranges.map(|[low, high]| numbers.list(n, low, high));
                 let output = [vec![0.0; n], vec![0.0; n]];
-                Ok(Self::Camera {
-                    kernel,
-                    model,
-                    camera: camera(model)?,
-                    input,
-                    output,
-                    valid: vec![false; n],
-                })
+                Ok(Self::Camera { kernel, camera: camera(model)?, input, output, valid: vec![false; n] })
             }
             KernelName::Zmap => {
                 let cloud = Arc::new(Cloud::from_points(room(n), &CloudOptions::default())?);
@@ -137,9 +118,9 @@ impl Work {
     }
 
     /// Rounds of the kernel and of what limits it, in turn.
-    pub(super) fn measure(&mut self, machine: &Machine) -> RunResult<Measured> {
+    pub(super) fn measure(&mut self) -> RunResult<Measured> {
         match self {
-            Self::Camera { kernel, model, camera, input, output, valid } => {
+            Self::Camera { kernel, camera, input, output, valid } => {
                 let (kernel, n) = (*kernel, valid.len());
                 let [u, v] = output;
                 // Half of them are read, half written; a mask's byte too.
@@ -164,13 +145,7 @@ impl Work {
                     },
                     || seconds(|| copy_bytes(&from, &mut to)),
                 );
-                let operations = operations(kernel, *model);
-                let sums = n as f64 * operations.sums / machine.multiply_adds_per_second;
-                let divisions = n as f64 * operations.divisions / machine.divisions_per_second;
-                let limits = [(copy, "memory"), (sums, "multiply-add"), (divisions, "division")];
-                let (limit_seconds, limit) =
-                    limits.into_iter().fold((0.0, ""), |most, one| if one.0 > most.0 { one } else { most });
-                Ok(Measured { seconds: best, limit_seconds, limit })
+                Ok(Measured { seconds: best, limit_seconds: copy, limit: "memory" })
             }
             Self::ZMap { camera, cloud } => {
                 let keyframe = Keyframe {
@@ -230,27 +205,4 @@ fn rounds(mut kernel: impl FnMut() -> f64, mut limit: impl FnMut() -> f64) -> (f
         best_limit = best_limit.min(limit());
     }
     (best, best_limit)
-}
-
-/// What the formulas of `vice_core::camera` cost for one point; products that two terms share are counted once.
-fn operations(kernel: KernelName, model: ModelName) -> Operations {
-    let (distort, step) = match model {
-        ModelName::Pinhole => ((0.0, 0.0), (0.0, 0.0)),
-        // A step: distortion with its Jacobian, the 2x2 system, its length and the two tests.
-        ModelName::Radtan => ((21.0, 0.0), (76.0, 2.0)),
-        ModelName::Rational => ((27.0, 1.0), (90.0, 4.0)),
-        ModelName::Equidistant => ((50.0, 3.0), (101.0, 7.0)),
-    };
-    // Radius and its limit, focal lengths and principal point; x/z and y/z.
-    let project = Operations { sums: 9.0 + distort.0, divisions: 2.0 + distort.1 };
-    let unproject = Operations { sums: 4.0 + NEWTON_STEPS * step.0, divisions: 2.0 + NEWTON_STEPS * step.1 };
-    match kernel {
-        KernelName::Project => project,
-        KernelName::Unproject => unproject,
-        // Times the depth, and the rotation by a quaternion.
-        _ => Operations {
-            sums: project.sums + unproject.sums + 35.0,
-            divisions: project.divisions + unproject.divisions,
-        },
-    }
 }

@@ -3,6 +3,7 @@
 //! usage: `cargo run --release -p vice-benches --bin peers [-- --rounds N] [--points N] [--write FILE]`
 //!
 //! - C++: `peers/opencv.cpp`, compiled here with `c++` (or `CXX`) against Debian's `libopencv-dev`.
+//! - Plain loops: `peers/strong.cpp`, the fastest way known for the same formulas, compiled with all that this machine has.
 //! - Python: `peers/peers.py` with `VICE_PEERS_PYTHON` (by default `python3`), which needs `opencv-python-headless`,
 //!   `numpy`, `scipy`, `plyfile` and `evo`.
 //! - Ours: the program `vice`, built here, so that a user without a Rust tool chain can repeat it with `vice bench`.
@@ -63,6 +64,7 @@ fn main() -> Result<(), Box<dyn Error + Send + Sync>> {
         eprintln!("round {} of {}", round + 1, options.rounds);
         rounds.start();
         peers.cpp(options.points, &files, &mut rounds)?;
+        peers.strong(options.points, &mut rounds)?;
         ours.kernels(options.points, &mut rounds)?;
         ours.depth(&files, &mut rounds)?;
         ours.tracker(&files, &mut rounds)?;

@@ -85,6 +85,11 @@ impl Ours {
                 }
             }
         }
+        let (n, one) = (points.to_string(), "1");
+        let document =
+            self.bench(&["unproject", "--model", "equidistant", "--points", &n, "--threads", one])?;
+        let per_second = document["results"][0]["points_per_second"].as_f64().unwrap_or(f64::NAN);
+        rounds.add(Side::Ours, "unproject equidistant", points, points as f64 / per_second);
         // OpenCV's projection moves the points too, which is one more kernel here, timed in this process.
         let seconds = vice_benches::in_one_thread(|| vice_benches::project_moved_seconds(points))?;
         rounds.add(Side::Ours, "project moved", points, seconds);
@@ -144,6 +149,8 @@ impl Ours {
 /// What a user would pick instead.
 pub(crate) struct Peers {
     cpp: Option<PathBuf>,
+    /// Plain loops, as the standard has arithmetic, and with vector functions.
+    strong: Option<[PathBuf; 2]>,
     python: Option<OsString>,
     evo: Option<PathBuf>,
     pub(crate) missing: Vec<String>,
@@ -153,6 +160,7 @@ impl Peers {
     pub(crate) fn find(folder: &Path) -> Self {
         let mut missing = Vec::new();
         let cpp = compile(folder).map_err(|e| missing.push(format!("OpenCV from C++: {e}"))).ok();
+        let strong = compile_strong(folder).map_err(|e| missing.push(format!("plain C++ loops: {e}"))).ok();
         let python = std::env::var_os("VICE_PEERS_PYTHON").unwrap_or_else(|| "python3".into());
         let python = match run(python_command(&python).args(["-c", "import numpy, cv2"])) {
             Ok(()) => Some(python),
@@ -176,13 +184,20 @@ impl Peers {
                 missing.push(format!("{module}: the Python cannot import it"));
             }
         }
-        Self { cpp, python, evo, missing }
+        Self { cpp, strong, python, evo, missing }
     }
 
     pub(crate) fn cpp(&self, points: usize, files: &Files, rounds: &mut Rounds) -> Result<()> {
         let Some(program) = &self.cpp else { return Ok(()) };
         let mut command = Command::new(program);
         lines(command.arg(points.to_string()).args(&files.pictures), Side::Cpp, rounds)
+    }
+
+    pub(crate) fn strong(&self, points: usize, rounds: &mut Rounds) -> Result<()> {
+        for program in self.strong.iter().flatten() {
+            lines(Command::new(program).arg(points.to_string()), Side::Strong, rounds)?;
+        }
+        Ok(())
     }
 
     pub(crate) fn python(&self, points: usize, files: &Files, rounds: &mut Rounds) -> Result<()> {
@@ -221,8 +236,7 @@ fn compile(folder: &Path) -> Result<PathBuf> {
         |_| "-I/usr/include/opencv4".into(),
         |o| String::from_utf8_lossy(&o.stdout).into_owned(),
     );
-    let compiler = std::env::var_os("CXX").unwrap_or_else(|| "c++".into());
-    run(Command::new(compiler)
+    run(Command::new(compiler())
         .args(["-O3", "-march=native", "-std=c++17"])
         .args(flags.split_whitespace())
         .arg(&source)
@@ -232,6 +246,29 @@ fn compile(folder: &Path) -> Result<PathBuf> {
             ["opencv_calib3d", "opencv_video", "opencv_imgproc", "opencv_core"].map(|l| format!("-l{l}")),
         ))?;
     Ok(program)
+}
+
+fn compiler() -> OsString {
+    std::env::var_os("CXX").unwrap_or_else(|| "c++".into())
+}
+
+/// The loops twice: the second time with a tangent for whole registers, which its numbers need not be the same for.
+fn compile_strong(folder: &Path) -> Result<[PathBuf; 2]> {
+    let source = folder.join("strong.cpp");
+    std::fs::write(&source, include_str!("../../../peers/strong.cpp"))?;
+    let build = |name: &str, flags: &[&str]| -> Result<PathBuf> {
+        let program = folder.join(name);
+        let wide: &[&str] = if cfg!(target_arch = "x86_64") { &["-mprefer-vector-width=512"] } else { &[] };
+        run(Command::new(compiler())
+            .args(["-O3", "-march=native", "-std=c++17"])
+            .args(wide)
+            .args(flags)
+            .arg(&source)
+            .arg("-o")
+            .arg(&program))?;
+        Ok(program)
+    };
+    Ok([build("strong", &["-ffp-contract=off"])?, build("strong-fast", &["-ffast-math", "-DFAST"])?])
 }
 
 /// Runs a program that must succeed; its last line is why where it does not.

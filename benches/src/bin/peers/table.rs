@@ -14,7 +14,10 @@ use crate::sizes::Sizes;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Side {
     Ours,
+    /// OpenCV from C++.
     Cpp,
+    /// Plain loops in C++ for the same formulas.
+    Strong,
     Python,
 }
 
@@ -37,7 +40,7 @@ const fn row(
     Row { case, ours: (Side::Ours, ours), theirs, what, goal }
 }
 
-const ROWS: [Row; 14] = [
+const ROWS: [Row; 18] = [
     row(
         "project, radtan",
         "project",
@@ -59,22 +62,32 @@ const ROWS: [Row; 14] = [
         "Python `cv2.projectPoints`",
         None,
     ),
-    row(
-        "unproject, radtan, 1e-10",
-        "unproject",
-        (Side::Cpp, "unproject"),
-        "C++ `cv::undistortPoints`, 1e-10",
-        Some(30.0),
-    ),
-    row(
-        "unproject, radtan, 1e-10",
-        "unproject",
-        (Side::Python, "unproject"),
-        "Python `cv2.undistortPoints`, 1e-10",
-        None,
-    ),
+    row("unproject, radtan", "unproject", (Side::Cpp, "unproject"), "C++ `cv::undistortPoints`", Some(30.0)),
+    row("unproject, radtan", "unproject", (Side::Python, "unproject"), "Python `cv2.undistortPoints`", None),
     row("equation 1, radtan", "track", (Side::Cpp, "track"), "C++ OpenCV, both and a loop", None),
     row("equation 1, radtan", "track", (Side::Python, "track"), "OpenCV with NumPy", Some(40.0)),
+    row("project, radtan", "project", (Side::Strong, "project"), "plain C++ loop", Some(0.95)),
+    row(
+        "unproject, radtan",
+        "unproject",
+        (Side::Strong, "unproject"),
+        "plain C++ loop: seed and two steps",
+        Some(0.87),
+    ),
+    row(
+        "unproject, equidistant",
+        "unproject equidistant",
+        (Side::Strong, "unproject equidistant"),
+        "plain C++ loop, `-ffast-math`: three steps",
+        Some(0.87),
+    ),
+    row(
+        "equation 1, radtan",
+        "track",
+        (Side::Strong, "sum"),
+        "the plain loops' unproject and project",
+        Some(0.83),
+    ),
     row(
         "`vice trajectory --align se3`",
         "trajectory",
@@ -123,7 +136,7 @@ pub(crate) struct Rounds {
     count: usize,
     times: Times,
     pub(crate) sizes: Sizes,
-    machines: BTreeMap<u64, [f64; 3]>,
+    machines: BTreeMap<u64, f64>,
 }
 
 impl Rounds {
@@ -143,10 +156,7 @@ impl Rounds {
     pub(crate) fn machine(&mut self, machine: &Value) {
         let Some(threads) = machine["threads"].as_u64() else { return };
         let best = self.machines.entry(threads).or_default();
-        let names = ["memcpy_bytes_per_second", "multiply_adds_per_second", "divisions_per_second"];
-        for (best, name) in best.iter_mut().zip(names) {
-            *best = best.max(machine[name].as_f64().unwrap_or(0.0));
-        }
+        *best = best.max(machine["memcpy_bytes_per_second"].as_f64().unwrap_or(0.0));
     }
 
     fn ratios(&self, theirs: (Side, &str), ours: (Side, &str)) -> Vec<f64> {
@@ -195,14 +205,12 @@ impl Rounds {
         }
         let _ = write!(text, "\n{}", self.sizes.render());
         text.push('\n');
-        for (threads, [copy, sums, divisions]) in &self.machines {
+        for (threads, copy) in &self.machines {
             let _ = writeln!(
                 text,
-                "- {threads} thread{}: memcpy {:.1} GB/s (read and written), {:.1}e9 multiply-adds/s, {:.2}e9 divisions/s",
+                "- {threads} thread{}: memcpy {:.1} GB/s (read and written)",
                 if *threads == 1 { "" } else { "s" },
                 copy / 1e9,
-                sums / 1e9,
-                divisions / 1e9
             );
         }
         for missing in missing {
