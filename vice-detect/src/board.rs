@@ -80,6 +80,9 @@ pub(crate) enum Found {
     Nothing,
 }
 
+/// How far the next corner of a board may lie from where two before it say, in steps: perspective and lens do no more.
+const EVEN: f64 = 0.35;
+
 /// Position in the grid, in steps from where the walk began.
 type Cell = (i32, i32);
 /// Corners by their position.
@@ -91,7 +94,7 @@ pub(crate) fn find(smooth: &Gray, saddles: &[Saddle], size: BoardSize) -> Found 
     for tolerance in TOLERANCES {
         let mut best: Option<Board> = None;
         for grid in grids(saddles, &links(saddles, tolerance)) {
-            match fit(smooth, grid, size) {
+            match fit(smooth, saddles, &grid, size) {
                 Found::Board(board) if best.as_ref().is_none_or(|b| board.confidence > b.confidence) => {
                     best = Some(board);
                 }
@@ -165,24 +168,27 @@ fn prune(grid: &mut Grid) {
 }
 
 /// Whether a grid is the board asked for; missing corners are looked for where they should be.
-fn fit(smooth: &Gray, mut grid: Grid, size: BoardSize) -> Found {
+fn fit(smooth: &Gray, saddles: &[Saddle], grid: &Grid, size: BoardSize) -> Found {
     let (w, h) = (size.columns as i32, size.rows as i32);
     let shapes = if w == h { vec![(w, h)] } else { vec![(w, h), (h, w)] };
     let Some((inside, corner, shape)) =
-        shapes.into_iter().filter_map(|shape| window(&grid, shape)).max_by_key(|(inside, _, _)| *inside)
+        shapes.into_iter().filter_map(|shape| window(grid, shape)).max_by_key(|(inside, _, _)| *inside)
     else {
-        return other_size(&grid);
+        return other_size(grid);
     };
     let wanted = size.columns * size.rows;
-    let outside = grid.len() - inside;
-    if inside * 2 < wanted || outside * 10 > wanted {
-        return other_size(&grid);
+    if inside * 2 < wanted {
+        return other_size(grid);
     }
-    grid.retain(|cell, _| in_window(*cell, corner, shape));
-    if !complete(smooth, &mut grid, corner, shape) {
+    let mut board = grid.clone();
+    board.retain(|cell, _| in_window(*cell, corner, shape));
+    if !complete(smooth, &mut board, corner, shape) {
         return Found::Nothing;
     }
-    let corners: Vec<Vector2<f64>> = grid_in_order(&grid, corner, shape);
+    if goes_on(saddles, &board, corner, shape) {
+        return other_size(grid);
+    }
+    let corners: Vec<Vector2<f64>> = grid_in_order(&board, corner, shape);
     let spacing = spacing(&corners, shape);
     let reach = if spacing < 9.0 { 2 } else { 3 };
     let mut refined = Vec::with_capacity(corners.len());
@@ -216,6 +222,27 @@ fn window(grid: &Grid, shape: (i32, i32)) -> Option<(usize, Cell, (i32, i32))> {
         }
     }
     best
+}
+
+/// Whether the board goes on beyond a window: along a good part of one of its sides there are saddles where the next
+/// corners would be, linked to it or not. What else hangs on to the grid is print or things beside the board.
+fn goes_on(saddles: &[Saddle], grid: &Grid, corner: Cell, (w, h): (i32, i32)) -> bool {
+    let line = |first: Cell, along: Cell, out: Cell, length: i32| {
+        let even = (0..length).filter(|k| {
+            let at = |steps: i32| {
+                grid.get(&(first.0 + along.0 * k + out.0 * steps, first.1 + along.1 * k + out.1 * steps))
+            };
+            let (Some(edge), Some(inner)) = (at(0), at(-1)) else { return false };
+            let (next, reach) = (edge * 2.0 - inner, EVEN * (edge - inner).norm());
+            saddles.iter().any(|s| (Vector2::new(s.x, s.y) - next).norm() < reach)
+        });
+        even.count() * 2 > length as usize
+    };
+    let (i, j) = corner;
+    line((i, j), (1, 0), (0, -1), w)
+        || line((i, j + h - 1), (1, 0), (0, 1), w)
+        || line((i, j), (0, 1), (-1, 0), h)
+        || line((i + w - 1, j), (0, 1), (1, 0), h)
 }
 
 fn extents(grid: &Grid) -> Option<[[i32; 2]; 2]> {

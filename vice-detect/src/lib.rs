@@ -21,6 +21,7 @@ mod edges;
 mod family;
 mod gray;
 mod links;
+mod plane;
 mod pose;
 mod quads;
 mod saddle;

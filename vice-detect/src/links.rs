@@ -36,8 +36,48 @@ impl Links {
     }
 }
 
-/// Links that both ends agree on.
+/// Opposite sides of a square differ no more than this in the picture, one by the other: neighbours on a board lie near
+/// each other.
+const UNLIKE_SIDES: f64 = 1.7;
+
+/// Links that are the side of a square: on a board each is, while chance and print beside the board seldom close one.
 pub(crate) fn links(saddles: &[Saddle], tolerance: Tolerance) -> Vec<Links> {
+    let mutual = mutual(saddles, tolerance);
+    let place = |at: usize| Vector2::new(saddles[at].x, saddles[at].y);
+    let alike = |a: [usize; 2], b: [usize; 2]| {
+        let length = |[from, to]: [usize; 2]| (place(to) - place(from)).norm();
+        let (a, b) = (length(a), length(b));
+        a < UNLIKE_SIDES * b && b < UNLIKE_SIDES * a
+    };
+    let mut sides: Vec<(usize, usize)> = Vec::new();
+    for (corner, neighbours) in mutual.iter().enumerate() {
+        for (k, (one_way, one)) in neighbours.0.iter().enumerate() {
+            for (other_way, other) in &neighbours.0[k + 1..] {
+                if one_way.dot(other_way).abs() > 0.9 {
+                    continue;
+                }
+                let across =
+                    mutual[*one].0.iter().map(|(_, to)| *to).find(|across| {
+                        *across != corner && mutual[*other].0.iter().any(|(_, to)| to == across)
+                    });
+                let Some(across) = across else { continue };
+                if alike([corner, *one], [*other, across]) && alike([corner, *other], [*one, across]) {
+                    for (a, b) in [(corner, *one), (corner, *other), (*one, across), (*other, across)] {
+                        sides.extend([(a, b), (b, a)]);
+                    }
+                }
+            }
+        }
+    }
+    sides.sort_unstable();
+    let is_side = |from: usize, to: usize| sides.binary_search(&(from, to)).is_ok();
+    let kept = mutual.into_iter().enumerate();
+    kept.map(|(from, links)| Links(links.0.into_iter().filter(|(_, to)| is_side(from, *to)).collect()))
+        .collect()
+}
+
+/// Links that both ends agree on.
+fn mutual(saddles: &[Saddle], tolerance: Tolerance) -> Vec<Links> {
     // Nearest in each of the four directions: edge 0 forwards and backwards, edge 1 forwards and backwards.
     let mut nearest = vec![[(f64::MAX, usize::MAX); 4]; saddles.len()];
     for (from, s) in saddles.iter().enumerate() {

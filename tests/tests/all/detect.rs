@@ -10,7 +10,7 @@ use vice_core::dataset::{DatasetFactory, OpenOptions};
 use vice_core::label::{LabelSet, ObservationSource};
 use vice_core::statistics::{quantile, sorted};
 use vice_core::time::Stamp;
-use vice_detect::{BoardSize, DetectOptions, Detection, TagFamily, TagOptions, detect_labels};
+use vice_detect::{BoardSize, DetectOptions, Detection, TagFamily, TagOptions, detect_labels, find_board};
 use vice_euroc::Euroc;
 use vice_tests::{Run, shared, vice};
 
@@ -113,6 +113,48 @@ fn the_board_of_euroc_is_found_where_opencv_finds_it() {
             .collect();
         assert_eq!(names.len(), 1, "{}: {names:?}", point.name);
     }
+}
+
+/// Corners of OpenCV's oracle, 54 in each of 13 photographs (an array of NumPy, not compressed).
+fn corners_of_opencv(path: &std::path::Path) -> Vec<Vec<Pixel>> {
+    let bytes = fs::read(path).unwrap();
+    let shape = b"(13, 54, 2)";
+    let at = bytes.windows(shape.len()).position(|w| w == shape).unwrap();
+    let end_of_line = bytes[at..].iter().position(|b| *b == b'\n').unwrap();
+    let numbers: Vec<f64> = bytes[at + end_of_line + 1..]
+        .chunks_exact(4)
+        .take(13 * 54 * 2)
+        .map(|b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])))
+        .collect();
+    numbers.chunks_exact(108).map(|c| c.chunks_exact(2).map(|p| Pixel::new(p[0], p[1])).collect()).collect()
+}
+
+#[test]
+fn the_boards_of_opencvs_photographs_are_found_and_no_others() {
+    let Some(path) = shared("data/chess_opencv") else { return };
+    let dataset = Euroc.open(&path, &OpenOptions::default()).unwrap();
+    let theirs = corners_of_opencv(&path.join("opencv_corners.npz"));
+    assert_eq!(dataset.frames("cam0").unwrap().len(), theirs.len());
+    let mut off = Vec::new();
+    for (frame, theirs) in theirs.iter().enumerate() {
+        let image = dataset.image("cam0", frame).unwrap();
+        let board = find_board(&image, BoardSize::new(9, 6).unwrap()).unwrap_or_else(|| panic!("{frame}"));
+        // The colours tell which end is which, and OpenCV does not look at them.
+        let errors = |turned: bool| -> Vec<f64> {
+            let at = |i: usize| board.turns[0][if turned { 53 - i } else { i }];
+            theirs.iter().enumerate().map(|(i, px)| at(i).distance_px(*px)).collect()
+        };
+        let most = |e: &Vec<f64>| e.iter().fold(0.0, |a: f64, b| a.max(*b));
+        let (straight, turned) = (errors(false), errors(true));
+        off.extend(if most(&straight) < most(&turned) { straight } else { turned });
+        // A part of the board is not a board of that size, nor is the board one of a larger size.
+        for other in ["8x6", "9x5", "8x5", "7x6", "6x4", "10x6", "9x7", "10x7"] {
+            assert_eq!(find_board(&image, other.parse().unwrap()), None, "{frame}: {other}");
+        }
+    }
+    let off = sorted(off);
+    let part = |p: f64| quantile(&off, p).unwrap();
+    assert!(part(0.5) < 0.15 && part(1.0) < 0.5, "median {} px, most {} px", part(0.5), part(1.0));
 }
 
 #[test]
