@@ -98,12 +98,15 @@ pub fn camera_difference(first: &Camera, second: &Camera) -> Option<CameraDiffer
     })
 }
 
+/// The difference of a place after a rotation.
+type Off<'a> = dyn Fn(&UnitQuaternion<f64>, usize) -> Option<[f64; 2]> + 'a;
+
 /// The rotation that leaves the least of the differences, by Gauss-Newton in pixels; far ones count less.
 fn best_turn(
     second: &Camera,
     pixels: &[Pixel],
     rays: &[Option<Vector3<f64>>],
-    off: &dyn Fn(&UnitQuaternion<f64>, usize) -> Option<[f64; 2]>,
+    off: &Off<'_>,
 ) -> Option<UnitQuaternion<f64>> {
     let mut turn = UnitQuaternion::identity();
     const H: f64 = 1e-6;

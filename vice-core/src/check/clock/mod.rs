@@ -293,7 +293,7 @@ impl<'a> Search<'a> {
             offset_s: offset(fit.lag_s),
             half_95_s: fit.lag_half_s,
             rate: (fit.rate != 0.0)
-                .then(|| ClockRate { share: self.sign * fit.rate, half_95: fit.rate_half }),
+                .then_some(ClockRate { share: self.sign * fit.rate, half_95: fit.rate_half }),
             correlation: fit.correlation,
             next_best,
             by_vectors: what == What::Vectors,
