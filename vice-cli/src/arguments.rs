@@ -13,7 +13,8 @@ use crate::commands;
     name = "vice",
     version,
     arg_required_else_help = true,
-    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but too many labels could not be scored.\n\
+    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but too many labels could not be\n\
+                  scored, or something is wrong (check) or uncertain (clock).\n\
                   Start with `vice demo`."
 )]
 pub(crate) struct Cli {
@@ -32,6 +33,13 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Make a short flight, evaluate three estimates of it and explain the result.
     Demo(commands::demo::Args),
+    /// Say what is wrong with a recording, before any label.
+    Check(Box<commands::check::Args>),
+    /// Find by how much the clocks of two motion sources differ.
+    Clock(commands::clock::Args),
+    /// Compare calibrations.
+    #[command(subcommand)]
+    Calibration(commands::calibration::Command),
     /// Evaluate pose estimates against labelled key points.
     Evaluate(Box<commands::evaluate::Args>),
     /// Find the flaw that explains the pixel errors of an estimate.

@@ -39,6 +39,9 @@ pub fn main_from(args: impl IntoIterator<Item = OsString>, itself: Itself) -> u8
     terminal::show_warnings(verbosity);
     let outcome = match &cli.command {
         Command::Annotate(args) => commands::annotate::run(args, verbosity),
+        Command::Calibration(command) => commands::calibration::run(command),
+        Command::Check(args) => commands::check::run(args),
+        Command::Clock(args) => commands::clock::run(args),
         Command::Demo(args) => commands::demo::run(args, verbosity),
         Command::Evaluate(args) => commands::evaluate::run(args, verbosity),
         Command::Diagnose(args) => commands::diagnose::run(args, verbosity),
@@ -62,7 +65,7 @@ pub fn main_from(args: impl IntoIterator<Item = OsString>, itself: Itself) -> u8
     };
     match outcome {
         Ok(Outcome::Done) => 0,
-        Ok(Outcome::TooManySkips) => 3,
+        Ok(Outcome::TooManySkips | Outcome::SomethingWrong) => 3,
         Ok(Outcome::RequirementBroken) => 4,
         Ok(Outcome::RunsFailed) => 1,
         Ok(Outcome::Interrupted) => signals::INTERRUPTED,

@@ -20,6 +20,8 @@ pub(crate) enum Outcome {
     Done,
     /// Done, but more labels than allowed could not be scored.
     TooManySkips,
+    /// Done, and a check found something wrong, or nothing certain.
+    SomethingWrong,
     /// Done, but a limit that was required is broken.
     RequirementBroken,
     /// The rest is done, but some runs of a batch failed.

@@ -17,6 +17,7 @@
 pub use nalgebra;
 
 pub mod camera;
+pub mod check;
 pub mod conventions;
 pub mod dataset;
 pub mod depth;

@@ -20,6 +20,7 @@ from conftest import program
 #: Where a command of the program is in the module.
 FUNCTIONS = {
     "trajectory": ["trajectory.compare", "trajectory.ape", "trajectory.rpe"],
+    "calibration": ["calibration_diff"],
     "floor": ["fit_floor"],
     "labels": ["convert_labels", "detect_labels"],
     "plugin": ["check_format", "new_plugin"],

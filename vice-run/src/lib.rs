@@ -21,6 +21,7 @@
 mod away;
 pub mod batch;
 pub mod bench;
+pub mod check;
 pub mod columns;
 pub mod conversion;
 pub mod demo;

@@ -1,5 +1,7 @@
 //! Pose streams: the reference and the estimates, by the data set's names or from files.
 
+mod given;
+
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -57,16 +59,8 @@ impl StreamsSpec {
     /// # Errors
     /// [`RunError`] if a stream is not there, cannot be read or started, or a setting fits none of them.
     pub fn load(&self, opened: &Opened, selection: &Selection<'_>) -> RunResult<LoadedStreams> {
-        let time_offset = self.time_offset.or(opened.calibrated_time_offset()).unwrap_or(Span::ZERO);
-        let mut loader = Loader {
-            spec: self,
-            opened,
-            selection,
-            time_offset,
-            reference: None,
-            formats: BTreeSet::new(),
-            suspicions: Suspicions::new(),
-        };
+        let mut loader = Loader::new(self, opened, Some(selection));
+        let time_offset = loader.time_offset;
         loader.reference = loader.load_reference()?;
         let mut list: Vec<Stream> = loader.reference.iter().cloned().collect();
         let mut inertial = None;
@@ -148,7 +142,8 @@ fn own_world(opened: &Opened, spec: &EstimateSpec) -> RunResult<Suspicion> {
 struct Loader<'a> {
     spec: &'a StreamsSpec,
     opened: &'a Opened,
-    selection: &'a Selection<'a>,
+    /// The labels, where something is scored.
+    selection: Option<&'a Selection<'a>>,
     time_offset: Span,
     reference: Option<Stream>,
     /// Formats of the files that were read.
@@ -156,7 +151,19 @@ struct Loader<'a> {
     suspicions: Suspicions,
 }
 
-impl Loader<'_> {
+impl<'a> Loader<'a> {
+    fn new(spec: &'a StreamsSpec, opened: &'a Opened, selection: Option<&'a Selection<'a>>) -> Self {
+        Self {
+            spec,
+            opened,
+            selection,
+            time_offset: spec.time_offset.or(opened.calibrated_time_offset()).unwrap_or(Span::ZERO),
+            reference: None,
+            formats: BTreeSet::new(),
+            suspicions: Suspicions::new(),
+        }
+    }
+
     fn dataset(&self) -> &dyn Dataset {
         self.opened.dataset.as_ref()
     }
@@ -256,10 +263,17 @@ impl Loader<'_> {
             RunError::usage("estimate", format!("{IMU_EULER} starts from a reference state"))
                 .advise("give `reference`")
         })?;
+        let selection = self.selection.ok_or_else(|| {
+            RunError::usage(
+                "estimate",
+                format!("{IMU_EULER} starts at the first key frame, and there are no labels"),
+            )
+            .advise("the IMU itself is looked at without being named")
+        })?;
         let start = ImuStart {
             dataset: self.opened.dataset.as_ref(),
             frames: &self.opened.frames,
-            selection: self.selection,
+            selection,
             reference,
             time_offset: self.time_offset,
             max_gap: self.spec.max_gap,
@@ -334,7 +348,7 @@ impl Loader<'_> {
             .map_err(|e| RunError::usage("initial-pose", e.to_string()))?;
         let start = self
             .selection
-            .first_keyframe()
+            .and_then(Selection::first_keyframe)
             .ok_or_else(|| RunError::usage("initial-pose", "there is no key frame to put it at"))?;
         let moved = if own { &mut list[..] } else { &mut list[anchor..=anchor] };
         for stream in moved {

@@ -14,6 +14,7 @@ mod batch;
 mod blackbird_oracle;
 mod camera_oracle;
 mod cases;
+mod check;
 mod commands;
 mod depth_oracle;
 mod detect;

@@ -204,17 +204,17 @@ impl Moments {
 }
 
 /// The rotation that turns one set of vectors onto another.
-pub(super) struct BestRotation {
+pub(crate) struct BestRotation {
     /// Takes vectors of the first set to those of the second.
-    pub(super) rotation: UnitQuaternion<f64>,
+    pub(crate) rotation: UnitQuaternion<f64>,
     /// `trace(R * correlation)`, the largest there is: Umeyama's `trace(D S)`.
-    pub(super) trace: f64,
+    pub(crate) trace: f64,
     /// By how much the next best is worse; at zero the rotation is arbitrary.
-    pub(super) gap: f64,
+    pub(crate) gap: f64,
 }
 
 /// Maximises `sum of b · R a` for a correlation `sum of a bᵀ`, which must be finite.
-pub(super) fn best_rotation(correlation: &Matrix3<f64>) -> BestRotation {
+pub(crate) fn best_rotation(correlation: &Matrix3<f64>) -> BestRotation {
     let s = |a: usize, b: usize| correlation[(a, b)];
     let (x, y, z) = (s(1, 2) - s(2, 1), s(2, 0) - s(0, 2), s(0, 1) - s(1, 0));
     let (xy, xz, yz) = (s(0, 1) + s(1, 0), s(0, 2) + s(2, 0), s(1, 2) + s(2, 1));

@@ -6,6 +6,7 @@ list with commas. ``vice COMMAND --help`` describes them. What the command print
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -25,9 +26,14 @@ def program(*args: str | os.PathLike[str], check: bool = True) -> str:
     Error
         Any other exit code but 0, unless ``check`` is false.
     """
+    return _program(args, (0,) if check else None)
+
+
+def _program(args: Sequence[str | os.PathLike[str]], fine: tuple[int, ...] | None) -> str:
+    """As :func:`program`, with the exit codes that are no error; ``None``: all."""
     words = [sys.executable, "-m", "vicepose", *(os.fspath(arg) for arg in args)]
     done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
-    if check and done.returncode:
+    if fine is not None and done.returncode not in fine:
         lines = [line.removeprefix("error: ") for line in done.stderr.splitlines() if not line.startswith("warning: ")]
         message = " ".join(lines) or f"vice ended with exit code {done.returncode}"
         raise (UsageError if done.returncode == 2 else Error)(message)
@@ -54,6 +60,12 @@ def _run(command: Sequence[str], places: Sequence[Any], options: dict[str, Any])
     return program(*command, *map(str, places), *_words(options))
 
 
+def _document(command: Sequence[str], places: Sequence[Any], options: dict[str, Any]) -> dict[str, Any]:
+    """The document of a command whose exit code 3 is an answer."""
+    document: dict[str, Any] = json.loads(_program([*command, *map(str, places), *_words({**options, "json": "-"})], (0, 3)))
+    return document
+
+
 def annotate(run: Any, labels: Any, **options: Any) -> str:
     """Labels key points in the browser, until it is told to end (Ctrl-C)."""
     return _run(["annotate"], [run], {"labels": labels, **options})
@@ -62,6 +74,29 @@ def annotate(run: Any, labels: Any, **options: Any) -> str:
 def bench(**options: Any) -> str:
     """How fast points are projected here, beside the machine's limit."""
     return _run(["bench"], [], options)
+
+
+def calibration_diff(first: Any, second: Any, **options: Any) -> dict[str, Any]:
+    """By how many pixels two calibrations differ, after the best common rotation: the document ``vice.calibration-diff/1``."""
+    return _document(["calibration", "diff"], [first, second], options)
+
+
+def check(run: Any, **options: Any) -> dict[str, Any]:
+    """What is wrong with a recording, before any label: the document ``vice.check/1``.
+
+    ``findings`` is a list of dictionaries with ``check``, ``about``, ``state`` (``ok``, ``look``, ``wrong``, ``unknown``),
+    ``says``, ``numbers`` and ``mend``; ``worst`` is the worst state. Something wrong raises nothing.
+    """
+    return _document(["check"], [run], options)
+
+
+def clock(reference: Any, estimate: Any, **options: Any) -> dict[str, Any]:
+    """By how much the clocks of two files of poses or inertial samples differ: the document ``vice.clock/1``.
+
+    ``time_offset_s`` is what is added to the stamps of the second, where ``known`` is true. With ``dataset=RUN`` also
+    ``imu`` and names of its streams. An offset that is too uncertain raises nothing.
+    """
+    return _document(["clock"], [reference, estimate], options)
 
 
 def convert(run: Any, out: Any, *, to: str, **options: Any) -> str:

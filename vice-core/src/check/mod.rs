@@ -1,0 +1,45 @@
+//! What is wrong with a recording, before any label.
+//!
+//! Each file is one check: what it looks at, its thresholds, their source and its test. None of them reads a file; who has
+//! the data hands it over. A check says a [`Finding`]: a [`State`], a sentence, the numbers and what mends it. A check that
+//! cannot know says [`State::Unknown`] and why, never that all is well.
+
+pub mod camera_difference;
+pub mod clock;
+pub mod coverage;
+mod finding;
+pub mod inertial;
+pub mod motion;
+pub mod optics;
+pub mod path;
+pub mod stamps;
+pub mod turning;
+
+pub use finding::{Finding, Number, State, short};
+
+/// What a check is, for `vice check --list`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Check {
+    /// Its name in findings, in kebab-case.
+    pub name: &'static str,
+    /// A heading.
+    pub title: &'static str,
+    /// What it looks at.
+    pub looks_at: &'static str,
+    /// When it says `look` and `wrong`.
+    pub threshold: &'static str,
+    /// Where the thresholds come from.
+    pub source: &'static str,
+}
+
+/// All checks, in the order in which they are made.
+pub const CHECKS: [Check; 8] = [
+    stamps::CHECK,
+    coverage::CHECK,
+    clock::CHECK,
+    motion::CHECK,
+    inertial::CHECK,
+    inertial::GRAVITY,
+    path::CHECK,
+    optics::CHECK,
+];

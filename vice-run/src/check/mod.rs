@@ -1,0 +1,102 @@
+//! What is wrong with a recording, before any label: from a request to a list of findings.
+//!
+//! The checks are [`vice_core::check`]'s. Here the recording is opened as far as it can be, they are handed what it has,
+//! and the document is made. What cannot be read is a finding itself.
+
+mod calibration_diff;
+mod clock;
+mod gather;
+mod text;
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+use vice_core::check::{CHECKS, Finding, State};
+
+pub use calibration_diff::{CalibrationDiffDocument, CalibrationDiffRequest, compare_calibrations};
+pub use clock::{ClockDocument, ClockRequest, compare_clocks};
+pub use text::{list_text, render};
+
+use crate::error::RunResult;
+use crate::request::{DatasetSpec, Request, StreamsSpec};
+
+/// What is checked.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CheckRequest {
+    /// The recording.
+    pub dataset: DatasetSpec,
+    /// The pose streams beside its own.
+    #[serde(default)]
+    pub streams: StreamsSpec,
+}
+
+/// The document `vice.check/1`.
+#[derive(Clone, Debug, Serialize)]
+pub struct CheckDocument {
+    /// The schema's name and version.
+    pub schema: &'static str,
+    /// What was asked for.
+    pub request: CheckRequest,
+    /// Name of the recording.
+    pub name: String,
+    /// Its format.
+    pub format: String,
+    /// The worst state there is.
+    pub worst: State,
+    /// How many findings there are of each state.
+    pub counts: Counts,
+    /// The findings, in the order of the checks.
+    pub findings: Vec<Finding>,
+}
+
+/// How many findings there are of each state.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// Wrong.
+    pub wrong: usize,
+    /// Worth a look.
+    pub look: usize,
+    /// As it should be.
+    pub ok: usize,
+    /// Not known.
+    pub unknown: usize,
+}
+
+impl CheckRequest {
+    /// The files that are read.
+    pub fn inputs(&self) -> Vec<PathBuf> {
+        Request { dataset: self.dataset.clone(), streams: self.streams.clone(), ..Request::default() }
+            .inputs()
+    }
+}
+
+/// Checks a recording.
+///
+/// # Errors
+/// [`RunError`](crate::error::RunError) if no format reads it, or a stream that is named cannot be read.
+pub fn check(request: &CheckRequest) -> RunResult<CheckDocument> {
+    let gathered = gather::gather(request)?;
+    let mut findings = gathered.findings();
+    findings.sort_by_key(place);
+    let count = |state: State| findings.iter().filter(|f| f.state == state).count();
+    Ok(CheckDocument {
+        schema: "vice.check/1",
+        request: request.clone(),
+        name: gathered.name().to_string(),
+        format: gathered.format().to_string(),
+        worst: findings.iter().map(|f| f.state).max().unwrap_or(State::Unknown),
+        counts: Counts {
+            wrong: count(State::Wrong),
+            look: count(State::Look),
+            ok: count(State::Ok),
+            unknown: count(State::Unknown),
+        },
+        findings,
+    })
+}
+
+/// Where a check stands in the list; those of readers and formats stand first.
+fn place(finding: &Finding) -> usize {
+    CHECKS.iter().position(|c| c.name == finding.check).map_or(0, |p| p + 1)
+}
