@@ -18,6 +18,7 @@
 //! Nothing here prints, and nothing knows a command line.
 #![forbid(unsafe_code)]
 
+pub mod auto_labels;
 mod away;
 pub mod batch;
 pub mod bench;
@@ -64,5 +65,7 @@ pub use vice_files as files;
 pub use vice_host as host;
 /// A rendered flight with exact labels.
 pub use vice_synthetic as synthetic;
+/// The image tracker.
+pub use vice_track as track;
 /// Films.
 pub use vice_video as video;
