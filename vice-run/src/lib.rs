@@ -40,6 +40,7 @@ pub mod info;
 pub mod open;
 pub mod place;
 pub mod plugin;
+pub mod progress;
 pub mod report;
 pub mod request;
 pub mod require;
@@ -51,7 +52,8 @@ pub mod streams;
 pub mod text;
 pub mod trajectory;
 
-pub use evaluation::{Progress, Samples, evaluate_request, silent};
+pub use evaluation::{Samples, evaluate_request};
+pub use progress::{Progress, silent};
 
 /// The method.
 pub use vice_core as core;

@@ -45,6 +45,7 @@ from ._commands import (
     overlay,
     program,
     scan,
+    track_labels,
 )
 from ._errors import (
     ContradictoryError,
@@ -137,5 +138,6 @@ __all__ = [
     "sensitivity",
     "synth",
     "table",
+    "track_labels",
     "trajectory",
 ]

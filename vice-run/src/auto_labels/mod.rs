@@ -3,6 +3,7 @@
 //! No estimate is asked. A reference places the camera where the depth source needs that, only to tell where labels may
 //! start.
 
+mod cache;
 mod given;
 mod ground;
 mod summary;
@@ -19,17 +20,17 @@ use vice_track::auto::{Auto, AutoOptions, AutoReport, Timeline, auto_labels};
 use vice_track::{DOUBT_CONFIDENCE, TRACKER_VERSION};
 
 use crate::error::{RunError, RunResult};
-use crate::evaluation::Progress;
-use crate::request::{DEFAULT_MAX_GAP, DatasetSpec, DepthSpec, Protocol, ReferenceSpec};
+use crate::progress::Progress;
+use crate::request::{
+    DEFAULT_MAX_GAP, DEFAULT_POINTS, DatasetSpec, DepthSpec, MOST_POINTS, Protocol, ReferenceSpec,
+};
 use crate::scene::Scene;
+
+pub(crate) use cache::labels_of;
 
 use given::Givens;
 use ground::{Film, Grounds};
 
-/// Points that are labelled where nobody says how many: enough to outvote those that go wrong.
-pub const DEFAULT_POINTS: usize = 40;
-/// More are refused: there is no room for them in an image.
-pub const MOST_POINTS: usize = 1000;
 /// Where fewer points follow one motion (the median over the pairs of frames) something else moves, or nothing holds.
 const LOW_AGREEMENT: f64 = 0.75;
 /// Where more of the pairs have too few points that is said.
