@@ -6,11 +6,10 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use vice_annotate::suggest::{SuggestOptions, suggest};
 use vice_benches::shared;
 use vice_core::camera::Pixel;
 use vice_core::dataset::Image;
-use vice_track::{PointTrack, Pyramid, TrackOptions, corners, track_translation};
+use vice_track::{PointTrack, Pyramid, SuggestOptions, TrackOptions, corners, suggest, track_translation};
 
 const FRAMES: [&str; 2] = ["1403715408062142976.jpg", "1403715408112143104.jpg"];
 

@@ -9,7 +9,7 @@ use vice_core::time::Stamp;
 use vice_files::address::is_address;
 use vice_run::error::{RunError, RunResult};
 use vice_run::request::DepthName;
-use vice_run::request::Request;
+use vice_run::request::{Request, is_auto};
 
 use crate::estimates::Estimates;
 use crate::scene::SceneEstimates;
@@ -43,6 +43,10 @@ impl Desk {
         request.protocol.check()?;
         // Suggestions look at whatever knows the scene, besides the source that dots take their depth from.
         request.depth.check(&[DepthName::ZCam, DepthName::ZMap])?;
+        if is_auto(&request.labels.file) {
+            return Err(RunError::usage("labels", "what a person labels needs a file")
+                .advise("name one; `vice labels track` makes labels to begin with"));
+        }
         if is_address(&request.labels.file) {
             let problem = "labels are written while they are made, and this lies elsewhere";
             return Err(RunError::usage("labels", problem).advise("name a file of this machine"));

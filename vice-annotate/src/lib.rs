@@ -6,7 +6,6 @@
 //! | [`store`] | the labels while they are edited: journal, undo, the file |
 //! | [`jobs`] | tracking in the background |
 //! | [`estimates`] | what pose streams and depth add |
-//! | [`suggest`] | where to put new points |
 //! | [`exchange`] | labels from and for other tools |
 //! | [`server`] | all of this for a page in the browser |
 #![forbid(unsafe_code)]
@@ -18,4 +17,3 @@ pub mod jobs;
 mod scene;
 pub mod server;
 pub mod store;
-pub mod suggest;

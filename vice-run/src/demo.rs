@@ -16,7 +16,7 @@ use vice_files::image_file::encode_png;
 use vice_synthetic::{Synthetic, SyntheticOptions, write_euroc};
 
 use crate::error::{RunError, RunResult};
-use crate::evaluation::Progress;
+use crate::progress::Progress;
 use crate::report::frames::Shots;
 use crate::report::html::{IMAGE_BUDGET_BYTES, Run, Section, render};
 use crate::report::numbers::{first_and_last, mean};

@@ -78,7 +78,7 @@ pub fn compare_depths(request: &Request) -> RunResult<DepthComparison> {
     }
     let scene = Scene::open(&request.dataset, &request.streams.reference, request.streams.max_gap)?;
     let opened = &scene.opened;
-    let (labels, mut suspicions) = request.labels.read(opened)?;
+    let (labels, mut suspicions) = request.labels(opened, &crate::progress::silent)?;
     let sources = request.depth.make_all(opened)?;
     let selection = Selection::new(&labels, &opened.frames, &opened.camera, &request.window())
         .context(|| address::shown_path(&request.labels.file).display().to_string())?;

@@ -8,7 +8,7 @@ use vice_depth::{DepthMap, depth_image};
 use vice_files::image_file::{encode_depth_png, encode_png};
 
 use crate::error::{RunError, RunResult};
-use crate::evaluation::Progress;
+use crate::progress::Progress;
 use crate::report::depth_picture::{common_range, depth_picture, difference_picture};
 use crate::report::{npy, table};
 use crate::request::DepthSpec;

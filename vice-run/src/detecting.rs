@@ -9,8 +9,8 @@ use vice_files::atomic::Overwrite;
 use vice_files::labels;
 
 use crate::error::{RunError, RunResult};
-use crate::evaluation::Progress;
 use crate::open::Opened;
+use crate::progress::Progress;
 use crate::request::Protocol;
 
 /// What was found, and how the search went.

@@ -14,8 +14,8 @@ use vice_core::time::{Span, Stamp};
 use vice_files::calibration::{CalibrationFile, CameraOverride};
 
 use crate::error::{Context, RunError, RunResult};
-use crate::evaluation::Progress;
 use crate::open::Opened;
+use crate::progress::Progress;
 use crate::request::Request;
 use crate::streams::LoadedStreams;
 
@@ -83,7 +83,7 @@ pub fn diagnose_all(
     progress: &Progress<'_>,
 ) -> RunResult<Answers> {
     let flaws = looking.flaws();
-    request.with_evaluation(opened, false, |evaluation, streams| {
+    request.with_evaluation(opened, false, progress, |evaluation, streams| {
         let mut answers = Vec::new();
         for stream in estimates(evaluation) {
             for depth in 0..evaluation.depths.len() {
@@ -129,7 +129,7 @@ pub fn sensitivity_of(
     progress: &Progress<'_>,
 ) -> RunResult<(SensitivityDocument, Suspicions)> {
     let flaws = looking.flaws();
-    request.with_evaluation(opened, false, |evaluation, streams| {
+    request.with_evaluation(opened, false, progress, |evaluation, streams| {
         let estimates = estimates(evaluation);
         let ([stream], [_]) = (estimates.as_slice(), evaluation.depths) else {
             return Err(RunError::usage("estimate", "a sensitivity takes one estimate and one depth source"));

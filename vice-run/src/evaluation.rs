@@ -6,18 +6,15 @@ use vice_core::label::LabelSet;
 use vice_core::suspicion::Suspicions;
 use vice_files::{address, labels};
 
+use crate::auto_labels::{self, TrackingSpec};
 use crate::error::{Context, RunError, RunResult};
 use crate::open::Opened;
 use crate::place::Place;
-use crate::request::{LabelsSpec, Request};
+use crate::progress::Progress;
+use crate::request::{DepthName, DepthSpec, LabelsSpec, Request, points_asked};
 use crate::result::{OWN_ANCHOR, ResultDocument, Used};
+use crate::scene::Scene;
 use crate::streams::LoadedStreams;
-
-/// Called with what is being done, and (done, total) of it.
-pub type Progress<'a> = dyn Fn(&'static str, usize, usize) + Sync + 'a;
-
-/// Progress for those who do not show it.
-pub fn silent(_: &'static str, _: usize, _: usize) {}
 
 /// Evaluates a request.
 ///
@@ -61,6 +58,11 @@ impl LabelsSpec {
                 (file.labels, file.suspicions)
             }
         };
+        self.chosen(labels, suspicions)
+    }
+
+    /// Those of the points that are asked for.
+    fn chosen(&self, labels: LabelSet, suspicions: Suspicions) -> RunResult<(LabelSet, Suspicions)> {
         tracing::info!("{} points with {} labels", labels.points().len(), labels.observation_count());
         let are_chosen = labels.points().iter().all(|p| self.points.contains(&p.name));
         let are_all = self.points.iter().all(|name| labels.points().iter().any(|p| p.name == *name));
@@ -85,6 +87,31 @@ impl Request {
         self.dataset.open()
     }
 
+    /// The labels: those of the file, or automatic ones, from the cache where they were made before. Automatic labels ask
+    /// the reference where the camera is, for depth that needs that, and never an estimate.
+    ///
+    /// # Errors
+    /// [`RunError`] if they cannot be read or made.
+    pub fn labels(&self, opened: &Opened, progress: &Progress<'_>) -> RunResult<(LabelSet, Suspicions)> {
+        let Some(points) = points_asked(&self.labels.file)? else { return self.labels.read(opened) };
+        let scene = Scene::of(opened.clone(), &self.streams.reference, self.streams.max_gap)?;
+        let names = self.depth.names();
+        // A point on the floor has depth by all sources; one elsewhere not by the floor.
+        let asked = names.iter().find(|n| **n == DepthName::Floor).or(names.first());
+        let spec = TrackingSpec {
+            dataset: self.dataset.clone(),
+            protocol: self.protocol,
+            points: Some(points),
+            from: None,
+            depth: DepthSpec { sources: asked.copied().into_iter().collect(), ..self.depth.clone() },
+            reference: self.streams.reference.clone(),
+            max_gap: self.streams.max_gap,
+        };
+        let made = auto_labels::labels_of(&spec, &scene, progress)?;
+        tracing::info!("{}", made.summary.replace('\n', "; "));
+        self.labels.chosen(made.labels, made.suspicions)
+    }
+
     /// Runs the pipeline on the recording.
     ///
     /// # Errors
@@ -98,7 +125,7 @@ impl Request {
         let keep = matches!(samples, Samples::Keep);
         let (checks, not_made) = self.depth.make_checks(opened);
         let checks: Vec<&dyn DepthSource> = checks.iter().map(AsRef::as_ref).collect();
-        self.with_evaluation(opened, keep, |evaluation, streams| {
+        self.with_evaluation(opened, keep, progress, |evaluation, streams| {
             let step = |done, total| progress("evaluating", done, total);
             let mut evaluation = *evaluation;
             evaluation.checks = &checks;
@@ -130,9 +157,10 @@ impl Request {
         &self,
         opened: &Opened,
         keep_samples: bool,
+        progress: &Progress<'_>,
         work: impl FnOnce(&Evaluation<'_>, &LoadedStreams) -> RunResult<T>,
     ) -> RunResult<T> {
-        let (labels, in_labels_file) = self.labels.read(opened)?;
+        let (labels, in_labels_file) = self.labels(opened, progress)?;
         let in_labels = |error: EvaluateError| match error {
             EvaluateError::Data(error) => RunError::from(error),
             error => match Err::<(), _>(error)

@@ -10,7 +10,7 @@ use vice_files::image_file::encode_png;
 use vice_video::Ffmpeg;
 
 use crate::error::{RunError, RunResult};
-use crate::evaluation::Progress;
+use crate::progress::Progress;
 use crate::report::film_frame;
 use crate::report::marks::Marks;
 use crate::report::numbers::time_zero;

@@ -18,6 +18,7 @@
 //! Nothing here prints, and nothing knows a command line.
 #![forbid(unsafe_code)]
 
+pub mod auto_labels;
 mod away;
 pub mod batch;
 pub mod bench;
@@ -40,6 +41,7 @@ pub mod info;
 pub mod open;
 pub mod place;
 pub mod plugin;
+pub mod progress;
 pub mod report;
 pub mod request;
 pub mod require;
@@ -51,7 +53,8 @@ pub mod streams;
 pub mod text;
 pub mod trajectory;
 
-pub use evaluation::{Progress, Samples, evaluate_request, silent};
+pub use evaluation::{Samples, evaluate_request};
+pub use progress::{Progress, silent};
 
 /// The method.
 pub use vice_core as core;
@@ -65,5 +68,7 @@ pub use vice_files as files;
 pub use vice_host as host;
 /// A rendered flight with exact labels.
 pub use vice_synthetic as synthetic;
+/// The image tracker.
+pub use vice_track as track;
 /// Films.
 pub use vice_video as video;

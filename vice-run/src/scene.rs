@@ -7,6 +7,7 @@ use vice_core::trajectory::Trajectory;
 use vice_files::trajectory::ReadOptions;
 
 use crate::error::{RunError, RunResult};
+use crate::in_memory::is_in_memory;
 use crate::open::Opened;
 use crate::request::{DatasetSpec, ReferenceSpec};
 
@@ -26,13 +27,23 @@ impl Scene {
     /// # Errors
     /// [`RunError`] if the recording or the reference cannot be read.
     pub fn open(dataset: &DatasetSpec, reference: &ReferenceSpec, max_gap: Span) -> RunResult<Self> {
-        let opened = dataset.open()?;
+        Self::of(dataset.open()?, reference, max_gap)
+    }
+
+    /// The same, of a recording that is open.
+    ///
+    /// # Errors
+    /// [`RunError`] if the reference cannot be read.
+    pub fn of(opened: Opened, reference: &ReferenceSpec, max_gap: Span) -> RunResult<Self> {
         let streams = opened.dataset.streams();
         let is_stream = |name: &str| streams.iter().any(|s| s == name);
         let anchor = match reference {
             ReferenceSpec::None => None,
             ReferenceSpec::Named(spec) if is_stream(&spec.to_string()) => {
                 Some(opened.dataset.trajectory(&spec.to_string())?)
+            }
+            ReferenceSpec::Named(spec) if is_in_memory(&spec.to_string()) => {
+                opened.in_memory.trajectory(&spec.to_string())?.cloned()
             }
             ReferenceSpec::Named(spec) => Some(spec.read_file(&ReadOptions::default())?.trajectory),
             ReferenceSpec::Default if is_stream(GROUND_TRUTH) => {

@@ -11,6 +11,9 @@
 //! | `point_track` | one point from frame to frame, with a confidence, until it is lost |
 //! | `corners` | places that can be tracked |
 //! | `lookalike` | whether a place is seen again beside itself |
+//! | `suggest` | where to put new points |
+//! | [`two_view`] | whether many points moved as one rigid scene does |
+//! | [`auto`] | labels without a hand |
 //!
 //! [`PointTrack`] is what labels are made with. [`track_translation`] is its first stage alone, for many points.
 //!
@@ -20,14 +23,17 @@
 #![forbid(unsafe_code)]
 
 mod affine;
+pub mod auto;
 mod corners;
 mod lookalike;
 mod lucas_kanade;
 mod point_track;
 mod pyramid;
 mod sampler;
+mod suggest;
 #[cfg(test)]
 mod tests;
+pub mod two_view;
 mod window;
 
 pub use corners::{Corner, corners};
@@ -36,6 +42,7 @@ pub use lucas_kanade::track_translation;
 pub use point_track::{DOUBT_CONFIDENCE, Outcome, PointTrack, Step, TrackError, TrackOptions};
 pub use pyramid::Pyramid;
 pub use pyramid::WINDOW_PX;
+pub use suggest::{SuggestOptions, Suggestion, suggest};
 
 /// Name and version of the tracker, for the labels that it made. It changes whenever its results may.
 pub const TRACKER_VERSION: &str = "vice-klt/1";

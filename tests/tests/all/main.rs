@@ -24,6 +24,7 @@ mod euroc_oracle;
 mod evaluate_oracle;
 mod fleet;
 mod fleet_cluster;
+mod labels_track;
 mod locobot_oracle;
 mod plugin_check;
 mod plugin_hostile;

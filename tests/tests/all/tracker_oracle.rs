@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use nalgebra::Point3;
-use vice_annotate::suggest::{SuggestOptions, suggest};
 use vice_core::camera::{Camera, Pixel};
 use vice_core::dataset::Dataset;
 use vice_files::image_file;
 use vice_synthetic::{CAMERA, Synthetic, SyntheticOptions};
 use vice_tests::{root, shared};
-use vice_track::{DOUBT_CONFIDENCE, PointTrack, Pyramid, TrackOptions, track_translation};
+use vice_track::{
+    DOUBT_CONFIDENCE, PointTrack, Pyramid, SuggestOptions, TrackOptions, suggest, track_translation,
+};
 
 fn median(mut values: Vec<f64>) -> f64 {
     vice_core::statistics::median(&mut values).unwrap()

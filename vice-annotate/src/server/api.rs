@@ -22,8 +22,7 @@ use crate::desk::Desk;
 use crate::exchange::{Exchange, ImportError, import};
 use crate::jobs::{Accepted, DetectRequest, JobState, Jobs, Listener, TrackRequest};
 use crate::store::{By, Changed, Edit, Store, StoreError, lock};
-use crate::suggest::{SuggestOptions, suggest};
-use vice_track::{DOUBT_CONFIDENCE, Pyramid};
+use vice_track::{DOUBT_CONFIDENCE, Pyramid, SuggestOptions, suggest};
 
 /// Edits of one request at most.
 const MAX_EDITS: usize = 10_000;

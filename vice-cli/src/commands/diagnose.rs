@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use vice_run::core::diagnose::{Flaw, OdometryNoise};
 use vice_run::diagnosis::{Looking, diagnose_all};
 use vice_run::files::atomic::Overwrite;
-use vice_run::report::diagnosis_text::render;
+use vice_run::report::diagnosis_text::{labels_line, render};
 use vice_run::request::Scoring;
 
 use crate::inputs::{EvaluationArgs, to_json};
@@ -81,7 +81,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
                 if let Some(path) = &args.json {
                     texts.push((path, to_json(&result)?));
                 }
-                printed.push(render(&result.diagnosis));
+                printed.push(labels_line(&request) + &render(&result.diagnosis));
                 match (&args.apply, calibration) {
                     (Some(path), Ok(file)) => {
                         file.write(path, Overwrite::Replace)?;

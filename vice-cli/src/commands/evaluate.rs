@@ -21,6 +21,7 @@ use crate::terminal::{self, Outcome, Verbosity, usage, with_progress};
 #[command(after_help = "Examples:\n  \
     vice evaluate V1_01_easy --labels floor.csv --estimate imu-euler,openvins.txt --depth floor,zmap\n  \
     vice evaluate my_run --labels labels.json --estimate rel:odometry.txt --reference none --depth zcam --json out.json\n  \
+    vice evaluate my_run --labels auto --estimate odom --depth zcam   (labels without a hand)\n  \
     vice evaluate --request out.json   (asks once more what out.json is the answer to)\n\n\
     Lists repeat the option or take commas. Estimates are names of the data set's streams, `imu-euler` (Euler\n\
     integration of its IMU from the reference state at the first key frame), or files: TUM, EuRoC CSV, KITTI with a\n\

@@ -48,6 +48,7 @@ from ._commands import (
     overlay,
     program,
     scan,
+    track_labels,
 )
 from ._errors import (
     ContradictoryError,
@@ -143,5 +144,6 @@ __all__ = [
     "sensitivity",
     "synth",
     "table",
+    "track_labels",
     "trajectory",
 ]

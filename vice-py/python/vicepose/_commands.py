@@ -146,3 +146,8 @@ def scan(folder: Any, base: Any = "") -> str:
     from . import _vicepose
 
     return _vicepose.scan(Path(folder).resolve(), Path(base).resolve() if base else Path())
+
+
+def track_labels(run: Any, out: Any, **options: Any) -> str:
+    """Chooses points and follows them through the frames (``points=40``, ``fps=10``), or goes on from labels (``from_``)."""
+    return _run(["labels", "track"], [run], {"out": out, **options})

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use vice_files::address::is_address;
 
-use crate::request::{EstimateFrame, EstimateSpec, ReferenceSpec, Request};
+use crate::request::{EstimateFrame, EstimateSpec, ReferenceSpec, Request, is_auto};
 
 /// The request with paths from where the program runs. A name that may be a stream or a file is a file where there is
 /// one beside the manifest.
@@ -16,7 +16,9 @@ pub(super) fn resolved(request: &Request, base: &Path) -> Request {
         }
     };
     join(&mut request.dataset.path);
-    join(&mut request.labels.file);
+    if !is_auto(&request.labels.file) {
+        join(&mut request.labels.file);
+    }
     request.dataset.calibration.iter_mut().for_each(join);
     request.dataset.plugins.files.iter_mut().for_each(join);
     request.streams.times.iter_mut().for_each(join);

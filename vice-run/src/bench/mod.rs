@@ -10,7 +10,7 @@ use vice_core::lanes::instruction_set;
 pub use self::limits::Machine;
 use self::work::Work;
 use crate::error::{RunError, RunResult};
-use crate::evaluation::Progress;
+use crate::progress::Progress;
 use crate::report::table;
 
 /// What is measured.

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use vice_core::diagnose::{DiagnosisDocument, VerdictKind};
 
 use super::table;
+use crate::request::{Request, labels_shown};
 use crate::text::printable;
 
 /// The diagnosis as text.
@@ -13,6 +14,11 @@ pub fn render(document: &DiagnosisDocument) -> String {
     // Writing to a string cannot fail.
     let _ = write_text(&mut text, document);
     text
+}
+
+/// Where the labels come from, where no person made them: a line ahead of a diagnosis.
+pub fn labels_line(request: &Request) -> String {
+    labels_shown(&request.labels.file).map_or_else(String::new, |labels| format!("labels: {labels}\n"))
 }
 
 fn write_text(text: &mut String, document: &DiagnosisDocument) -> std::fmt::Result {

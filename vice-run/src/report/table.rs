@@ -2,6 +2,7 @@
 
 use vice_core::suspicion::Suspicion;
 
+use crate::request::labels_shown;
 use crate::result::ResultDocument;
 
 use super::held::{self, filled, window_name, windows};
@@ -120,8 +121,10 @@ fn not_available() -> String {
 
 fn heading(document: &ResultDocument) -> String {
     let d = &document.dataset;
+    let labels =
+        labels_shown(&document.request.labels.file).map_or_else(String::new, |l| format!("labels: {l}\n"));
     format!(
-        "{} ({}, {}): RMSE_2D in px, mean ± sd over subsets of the points; ref: the reference against the labels, est: the estimate against the labels\n\n",
+        "{} ({}, {}): RMSE_2D in px, mean ± sd over subsets of the points; ref: the reference against the labels, est: the estimate against the labels\n{labels}\n",
         printable(&d.name),
         printable(&d.format),
         printable(&d.camera)

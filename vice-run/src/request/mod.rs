@@ -4,6 +4,7 @@
 //! fields are refused; what is left out has the default that is stated here. Files are named as they were given, so
 //! that a relative path means the folder in which the request is run; addresses are written without their secrets.
 
+mod automatic;
 mod command_line;
 mod depth_name;
 mod estimate;
@@ -21,6 +22,7 @@ use vice_core::metrics::align::Alignment;
 use vice_core::time::Span;
 use vice_detect::TagFamily;
 
+pub use automatic::{DEFAULT_POINTS, MOST_POINTS, is_auto, labels_shown, points_asked};
 pub use depth_name::{DepthName, ZMapInterpolation};
 pub use estimate::{Anchor, EstimateFrame, EstimateSpec, IMU_EULER, ReferenceSpec};
 
@@ -109,7 +111,7 @@ impl PluginsSpec {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LabelsSpec {
-    /// CSV, JSON, CVAT's XML, or the authors' pickle.
+    /// CSV, JSON, CVAT's XML, or the authors' pickle; or `auto` for labels that are made, `auto:4` with four points.
     #[serde(serialize_with = "word::path::serialize")]
     pub file: PathBuf,
     /// Only these points; empty: all.
@@ -288,7 +290,8 @@ impl Request {
 
     /// All that is read, and so must not be written over: files, and the whole data set.
     pub fn inputs(&self) -> Vec<PathBuf> {
-        let mut files = vec![self.dataset.path.clone(), self.labels.file.clone()];
+        let mut files = vec![self.dataset.path.clone()];
+        files.extend(Some(&self.labels.file).filter(|file| !is_auto(file)).cloned());
         files.extend(self.streams.estimates.iter().filter_map(|e| e.path().map(Path::to_path_buf)));
         if let ReferenceSpec::Named(EstimateSpec::Named(name)) = &self.streams.reference {
             files.push(PathBuf::from(name));
@@ -308,6 +311,7 @@ impl Request {
         self.protocol.check()?;
         self.depth.check(&[])?;
         self.streams.check_names()?;
+        points_asked(&self.labels.file)?;
         if self.streams.max_gap < Span::ZERO {
             return Err(RunError::usage("max-gap", "must not be negative"));
         }

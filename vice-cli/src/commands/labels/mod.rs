@@ -2,6 +2,7 @@
 
 mod convert;
 mod detect;
+mod track;
 
 use crate::terminal::{Outcome, Verbosity};
 
@@ -12,11 +13,14 @@ pub(crate) enum Command {
     Convert(convert::Args),
     /// Label the corners of AprilTags and chessboards by themselves.
     Detect(detect::Args),
+    /// Choose points and follow them through the frames, without a hand.
+    Track(Box<track::Args>),
 }
 
 pub(crate) fn run(command: &Command, verbosity: Verbosity) -> anyhow::Result<Outcome> {
     match command {
         Command::Convert(args) => convert::run(args),
         Command::Detect(args) => detect::run(args, verbosity),
+        Command::Track(args) => track::run(args, verbosity),
     }
 }

@@ -8,6 +8,7 @@ mod stream;
 mod tables;
 
 use crate::error::RunResult;
+use crate::request::labels_shown;
 use crate::result::ResultDocument;
 use maud::{Markup, html};
 use vice_core::result::{PixelPart, Role};
@@ -83,7 +84,13 @@ fn section(run: &Run, place: usize, alone: bool) -> Markup {
             @if alone { h1 { (run.name) } } @else { h2 { (run.name) } }
             p.soft {
                 (printable(&d.format)) ", camera " (printable(&d.camera)) ", "
-                (document.used.points.len()) " points labelled in " (printable(&document.request.labels.file.display().to_string()))
+                @match labels_shown(&document.request.labels.file) {
+                    Some(labels) => { "labels: " (labels) }
+                    None => {
+                        (document.used.points.len()) " points labelled in "
+                        (printable(&document.request.labels.file.display().to_string()))
+                    }
+                }
             }
             p { (summary(document)) }
             (cards(document))

@@ -2,7 +2,9 @@
 
 use vice_core::camera::Pixel;
 
-use vice_track::{Corner, Pyramid, corners, lookalike};
+use crate::corners::{Corner, corners};
+use crate::lookalike::lookalike;
+use crate::pyramid::Pyramid;
 
 /// Corners with a smaller share than this of the best one's score are no suggestions.
 const MIN_SHARE: f64 = 0.15;
