@@ -81,7 +81,7 @@ pub(crate) struct EvaluationArgs {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Labels")]
 pub(crate) struct LabelArgs {
-    /// Labels: CSV, JSON, CVAT's XML, or the authors' pickle.
+    /// Labels: CSV, JSON, Parquet, CVAT's XML, or the authors' pickle.
     #[arg(long, value_name = "FILE", required = true)]
     labels: Option<PathBuf>,
     /// Only these points.
