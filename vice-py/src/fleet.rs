@@ -9,7 +9,7 @@ use vice_run::batch::collect::{Format as FileFormat, collect as collect_store};
 use vice_run::batch::fleet_table::Format;
 use vice_run::batch::scan::scan as scan_folder;
 use vice_run::batch::{Keep, Manifest, Options, Shard, State, Store, plan as plan_batch, run as run_batch};
-use vice_run::columns::HAS_PARQUET;
+use vice_run::files::tables::HAS_PARQUET;
 
 use crate::errors::{Answer, OfPython, usage};
 use crate::work::{long, stoppable};

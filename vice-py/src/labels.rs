@@ -96,7 +96,7 @@ impl Labels {
         Ok(Self::of(LabelSet::from_rows(rows).map_err(|e| usage("labels", e.to_string()))?))
     }
 
-    /// Labels from a file: CSV, JSON, CVAT's XML, the authors' pickle. The last two count frames, and so need the run.
+    /// Labels from a file: CSV, JSON, Parquet, CVAT's XML, the authors' pickle. The last two count frames, and so need the run.
     #[classmethod]
     #[pyo3(signature = (path, run = None))]
     fn read(_: &Bound<'_, PyType>, py: Python<'_>, path: PathBuf, run: Option<&Recording>) -> Answer<Self> {
@@ -107,7 +107,7 @@ impl Labels {
         Ok(Self::of(core))
     }
 
-    /// Writes them as CSV or JSON, by the ending of the name.
+    /// Writes them as CSV, JSON or Parquet, by the ending of the name.
     #[pyo3(signature = (path, overwrite = false))]
     fn write(&self, path: PathBuf, overwrite: bool) -> Answer<()> {
         let overwrite = if overwrite { Overwrite::Replace } else { Overwrite::Refuse };

@@ -23,7 +23,6 @@ mod away;
 pub mod batch;
 pub mod bench;
 pub mod check;
-pub mod columns;
 pub mod conversion;
 pub mod demo;
 pub mod depth_compare;

@@ -3,12 +3,13 @@
 //! | module | what |
 //! | --- | --- |
 //! | [`trajectory`] | poses as TUM, EuRoC, KITTI and relative motions; found out by content |
-//! | [`labels`] | labels as CSV, JSON `vice.labels/1`, CVAT XML, and the pickle of the paper's authors |
+//! | [`labels`] | labels as CSV, Parquet, JSON `vice.labels/1`, CVAT XML, and the pickle of the paper's authors |
 //! | [`calibration`] | TOML or Kalibr files that override intrinsics and extrinsics |
 //! | [`rigid_file`] | the place of an estimate's frame in the body |
 //! | [`image_file`] | PNG and JPEG |
 //! | [`imu_file`] | inertial samples in a table |
 //! | [`rows`], [`heading`], [`columns`] | text in rows, and which column holds what by its name |
+//! | [`tables`] | tables in columns: Parquet |
 //! | [`yaml`] | YAML with OpenCV's dialect |
 //! | [`leniency`] | what readers repair or leave out, one rule for all |
 //! | [`not_text`] | recordings and archives given where text is expected |
@@ -32,5 +33,6 @@ pub mod paths;
 pub mod rigid_file;
 mod row;
 pub mod rows;
+pub mod tables;
 pub mod trajectory;
 pub mod yaml;

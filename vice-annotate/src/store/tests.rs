@@ -217,7 +217,7 @@ fn a_csv_goes_on_in_a_json() {
     assert_eq!(vice_files::labels::read(desk.path("a.json"), None).unwrap().points().len(), 2);
     assert_eq!(desk.open("a.csv").unwrap().document().points().len(), 2);
     desk.says("none/b.json", &["folder"]);
-    desk.says("b.txt", &[".csv or .json"]);
+    desk.says("b.txt", &[".csv, .json or .parquet"]);
 }
 
 #[test]

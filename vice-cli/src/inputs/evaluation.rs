@@ -81,7 +81,7 @@ pub(crate) struct EvaluationArgs {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Labels")]
 pub(crate) struct LabelArgs {
-    /// Labels: CSV, JSON, CVAT's XML, or the authors' pickle; or auto, which chooses 40 points and follows them without a
+    /// Labels: CSV, JSON, Parquet, CVAT's XML, or the authors' pickle; or auto, which chooses 40 points and follows them without a
     /// hand, auto:4 four (see `vice labels track`). They are kept in the user's cache folder.
     #[arg(long, value_name = "FILE|auto", required = true)]
     labels: Option<PathBuf>,

@@ -105,7 +105,7 @@ def convert(run: Any, out: Any, *, to: str, **options: Any) -> str:
 
 
 def convert_labels(source: Any, out: Any, **options: Any) -> str:
-    """Converts labels between CSV, JSON and CVAT's XML, or from the authors' pickle."""
+    """Converts labels between CSV, JSON, Parquet and CVAT's XML, or from the authors' pickle."""
     return _run(["labels", "convert"], [source, out], options)
 
 

@@ -15,7 +15,7 @@ use super::results::{ResultRow, SCHEMA};
 use super::results_file::{results_csv, to_csv, write_parquet};
 use super::samples::{self, Samples};
 use super::store::{RowRecord, Store};
-use crate::columns::{self, Values};
+use vice_files::tables::{self, Values};
 use crate::error::{RunError, RunResult};
 use crate::report::csv::cell;
 use crate::result;
@@ -173,7 +173,7 @@ fn write_timings(path: &Path, timings: &[Timing]) -> RunResult<()> {
         ),
         ("seconds".to_string(), Values::Numbers(timings.iter().map(|t| Some(t.seconds)).collect())),
     ];
-    columns::write(path, &table, |add| Ok(add(&table)?))
+    tables::write(path, &table, |add| Ok(add(&table)?))
 }
 
 /// A name that any file system takes, another for each run: letters that it may not take are replaced, and then a hash

@@ -7,11 +7,11 @@ use vice_core::error::DataResult;
 use super::cells::{Cells, RawRow, wrong};
 use super::csv_rows::part_defaults;
 use super::field::Cell;
-use crate::columns::{self, Values};
+use vice_files::tables::{self, Values};
 
 /// Rows with their numbers, from 1, and the defaults.
 pub(super) fn read(path: &Path) -> DataResult<(Cells, Vec<RawRow>)> {
-    let table = columns::read(path)?;
+    let table = tables::read(path)?;
     let mut rows = Vec::new();
     for at in 0..table.iter().map(|(_, values)| values.len()).min().unwrap_or(0) {
         let line = at as u64 + 1;

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 use vice_core::error::{DataError, DataResult, ErrorKind};
 
 use super::results::{ResultRow, SCHEMA};
-use crate::columns::{self, Column, Values, is_parquet};
+use vice_files::tables::{self, Column, Values, is_parquet};
 use crate::error::RunResult;
 use crate::report::csv::{cell, finished};
 
@@ -82,7 +82,7 @@ fn columns_of(rows: &[ResultRow]) -> Vec<Column> {
 /// [`RunError`](crate::error::RunError) with the path if it cannot be written.
 pub(super) fn write_parquet(path: &Path, rows: &[ResultRow]) -> RunResult<()> {
     let table = columns_of(rows);
-    columns::write(path, &table, |add| Ok(add(&table)?))
+    tables::write(path, &table, |add| Ok(add(&table)?))
 }
 
 /// `results.csv`; texts that a spreadsheet would calculate are guarded.
@@ -152,7 +152,7 @@ fn read_csv(path: &Path) -> DataResult<Vec<ResultRow>> {
 }
 
 fn read_parquet(path: &Path) -> DataResult<Vec<ResultRow>> {
-    let table = columns::read(path)?;
+    let table = tables::read(path)?;
     if table.first().is_none_or(|(name, _)| name != COLUMNS[0].0) {
         return Err(is_none(path, "its first column is not `schema`"));
     }
@@ -202,7 +202,7 @@ mod tests {
         std::fs::write(&csv, results_csv(&rows).unwrap()).unwrap();
         assert_eq!(read(&csv).unwrap(), rows);
         let parquet = folder.path().join("results.parquet");
-        if columns::HAS_PARQUET {
+        if tables::HAS_PARQUET {
             write_parquet(&parquet, &rows).unwrap();
             assert_eq!(read(&parquet).unwrap(), rows);
         }

@@ -13,7 +13,7 @@ use vice_core::time::Stamp;
 
 use super::key::Key;
 use super::store::Store;
-use crate::columns::{self, Column, Values};
+use vice_files::tables::{self, Column, Values};
 use crate::error::RunResult;
 use crate::result::ResultDocument;
 
@@ -69,7 +69,7 @@ pub(super) fn write<T>(
     path: &Path,
     evaluate: impl FnOnce(&mut SampleSink<'_>) -> RunResult<T>,
 ) -> RunResult<T> {
-    columns::write(path, &Rows::default().take(), |add| {
+    tables::write(path, &Rows::default().take(), |add| {
         let mut rows = Rows::default();
         let value = evaluate(&mut |stream, depth, samples| {
             let (stream, depth) = (Arc::from(stream), Arc::from(depth));
@@ -98,14 +98,14 @@ pub(super) fn write_kept(path: &Path, document: &ResultDocument) -> RunResult<()
 
 /// The samples of a run, with the columns before them that tell runs apart.
 pub(super) fn write_named(from: &Path, to: &Path, names: &[(&str, &str)]) -> RunResult<()> {
-    let table = columns::read(from)?;
+    let table = tables::read(from)?;
     let rows = table.first().map_or(0, |(_, values)| values.len());
     let named = names.iter().map(|(column, name)| {
         let name: Arc<str> = Arc::from(*name);
         ((*column).to_string(), Values::Text(vec![Some(name); rows]))
     });
     let table: Vec<Column> = named.chain(table).collect();
-    columns::write(to, &table, |add| Ok(add(&table)?))
+    tables::write(to, &table, |add| Ok(add(&table)?))
 }
 
 /// Reads what [`write()`] wrote.
@@ -113,7 +113,7 @@ pub(super) fn write_named(from: &Path, to: &Path, names: &[(&str, &str)]) -> Run
 /// # Errors
 /// [`DataError`] with the path if it is no such file.
 pub(super) fn read(path: &Path) -> DataResult<Vec<PartSamples>> {
-    let table = columns::read(path)?;
+    let table = tables::read(path)?;
     let wrong = || DataError::of_kind(ErrorKind::Corrupt, "is no table of samples").at(path);
     let rows = Columns::of(&table).ok_or_else(wrong)?;
     let mut parts: Vec<PartSamples> = Vec::new();
@@ -216,7 +216,7 @@ mod tests {
         assert_eq!(found[1].samples, made.pixel[0].samples);
         let named = folder.path().join("n.parquet");
         write_named(&path, &named, &[("run_id", "r")]).unwrap();
-        assert_eq!(columns::read(&named).unwrap()[0].0, "run_id");
+        assert_eq!(tables::read(&named).unwrap()[0].0, "run_id");
         assert_eq!(read(&named).unwrap(), found);
         std::fs::write(&path, "no table").unwrap();
         assert!(read(&path).unwrap_err().to_string().contains("is no Parquet file"));

@@ -108,6 +108,11 @@ impl Columns {
         }
     }
 
+    /// The unit of the stamps, where the name of their column says it or a row has shown it.
+    pub(super) const fn unit(&self) -> Option<TimeUnit> {
+        self.unit
+    }
+
     /// What the unit is called in messages.
     pub(super) fn unit_name(&self) -> &'static str {
         match self.unit {

@@ -143,7 +143,8 @@ pub fn write_json(writer: &mut dyn Write, labels: &LabelSet) -> io::Result<()> {
     writeln!(writer)
 }
 
-fn check_schema(schema: Option<&str>) -> DataResult<()> {
+/// Checks the name and version of a schema.
+pub(super) fn check_schema(schema: Option<&str>) -> DataResult<()> {
     let Some(schema) = schema else {
         return Err(DataError::new("no `schema` is named").hint(format!("labels are `{LABELS_SCHEMA}`")));
     };

@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | CSV | `point,timestamp_ns,u_px,v_px,keyframe` and optionally `source,flags`: the interchange form |
 //! | JSON | schema `vice.labels/1`, which also names the data set and the camera |
+//! | Parquet | the same in columns, with all that JSON has: for labels by the million |
 //! | CVAT | "CVAT for video 1.1", tracks of points, of the annotation tool CVAT; counts frames, as the pickle does |
 //! | pickle | `{point: {frame index: (array([x, y]), is_keyframe)}}`, as the paper's authors stored them; read only |
 
@@ -15,6 +16,7 @@ mod cvat_task;
 mod cvat_write;
 mod json_file;
 mod ndarray;
+mod parquet;
 mod pickle;
 mod pickle_machine;
 mod pickle_text;
@@ -50,6 +52,8 @@ pub enum LabelFormat {
     Pickle,
     /// "CVAT for video 1.1".
     Cvat,
+    /// In columns.
+    Parquet,
 }
 
 impl LabelFormat {
@@ -57,6 +61,7 @@ impl LabelFormat {
     pub fn of_content(bytes: &[u8]) -> Self {
         let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
         match text {
+            [b'P', b'A', b'R', b'1', ..] => Self::Parquet,
             // A dictionary in the protocols from 2 on, 1 and 0 of Python's pickle.
             [0x80, ..] | [b'}', ..] | [b'(', b'd', ..] => Self::Pickle,
             [b'{', ..] => Self::Json,
@@ -68,16 +73,16 @@ impl LabelFormat {
     /// The format that a file to be written is meant to have.
     ///
     /// # Errors
-    /// [`DataError`] if the extension is none of `csv`, `json` and `xml`.
+    /// [`DataError`] if the extension is none of `csv`, `json`, `parquet` and `xml`.
     pub fn for_writing(path: &Path) -> DataResult<Self> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
         match extension.to_ascii_lowercase().as_str() {
             "csv" => Ok(Self::Csv),
             "json" => Ok(Self::Json),
+            "parquet" => Ok(Self::Parquet),
             "xml" => Ok(Self::Cvat),
             _ => {
-                let problem =
-                    "labels are written as .csv or .json, or .xml for CVAT, by the name's extension";
+                let problem = "labels are written as .csv, .json or .parquet, or .xml for CVAT, by the name's extension";
                 Err(DataError::new(problem).at(path))
             }
         }
@@ -135,11 +140,15 @@ pub fn read(path: impl AsRef<Path>, frame_stamps: Option<&[Stamp]>) -> DataResul
 /// As [`read`], and where stamps were rounded, so that they no longer tell frames apart.
 pub fn read_file(path: impl AsRef<Path>, frame_stamps: Option<&[Stamp]>) -> DataResult<LabelFile> {
     let path = path.as_ref();
-    let bytes = read_bytes(path)?;
-    if let Some(what) = crate::not_text::what(&bytes) {
-        return Err(crate::not_text::error(what).at(path));
-    }
-    let file = parsed(&bytes, frame_stamps).map_err(|e| e.at(path))?;
+    let file = if parquet::is_parquet(path)? {
+        parquet::read_parquet(path, None).map_err(|e| e.at(path))?
+    } else {
+        let bytes = read_bytes(path)?;
+        if let Some(what) = crate::not_text::what(&bytes) {
+            return Err(crate::not_text::error(what).at(path));
+        }
+        parsed(&bytes, frame_stamps).map_err(|e| e.at(path))?
+    };
     if let Some(frames) = frame_stamps {
         rounded::check(&file.labels, frames).map_err(|e| e.at(path))?;
     }
@@ -147,7 +156,7 @@ pub fn read_file(path: impl AsRef<Path>, frame_stamps: Option<&[Stamp]>) -> Data
 }
 
 /// As [`read_file`], of some points: memory and most of the time are those of these points where the file is a CSV without
-/// quotes, each point in time order. What looks wrong is said of the whole file.
+/// quotes, each point in time order, or Parquet. What looks wrong is said of the whole file; of Parquet of these points.
 ///
 /// # Errors
 /// As [`read_file`]. A name that is no point of the file is none: all its labels are returned then.
@@ -157,7 +166,14 @@ pub fn read_points(
     points: &[String],
 ) -> DataResult<LabelFile> {
     let path = path.as_ref();
-    if let Some(sifted) = chosen::sift(path, points, frame_stamps) {
+    if parquet::is_parquet(path)? {
+        let file = parquet::read_parquet(path, Some(points)).map_err(|e| e.at(path))?;
+        let stamps = || file.labels.points().iter().flat_map(|p| &p.observations).map(|o| o.stamp);
+        let at_a_frame = frame_stamps.is_none_or(|f| stamps().any(|s| f.binary_search(&s).is_ok()));
+        if at_a_frame && let Ok(file) = of_points(file, points) {
+            return Ok(about(path, file));
+        }
+    } else if let Some(sifted) = chosen::sift(path, points, frame_stamps) {
         let file = csv_file::read_sifted(&sifted.bytes, sifted.passed).map_err(|e| e.at(path))?;
         let frames = frame_stamps.unwrap_or_default();
         let stamps = || file.labels.points().iter().flat_map(|p| &p.observations).map(|o| o.stamp);
@@ -193,6 +209,7 @@ fn parsed(bytes: &[u8], frame_stamps: Option<&[Stamp]>) -> DataResult<LabelFile>
             .ok_or_else(|| counts_frames("a pickle"))
             .and_then(|s| read_pickle(bytes, s))
             .map(LabelFile::of),
+        LabelFormat::Parquet => parquet::read_parquet_bytes(bytes),
         LabelFormat::Cvat => {
             frame_stamps.ok_or_else(|| counts_frames("CVAT")).and_then(|s| read_cvat_file(bytes, s))
         }
@@ -212,7 +229,7 @@ fn counts_frames(what: &str) -> DataError {
     DataError::new(problem).hint("name the data set that it labels")
 }
 
-/// Writes labels as CSV or JSON, by the extension, all or nothing. Sources and flags are kept.
+/// Writes labels as CSV, JSON or Parquet, by the extension, all or nothing. Sources and flags are kept.
 ///
 /// # Errors
 /// [`DataError`] if the extension is another one, or the file cannot be written or may not be replaced.
@@ -234,6 +251,9 @@ pub fn write_with_frames(
     let format = LabelFormat::for_writing(path)?;
     if format == LabelFormat::Cvat && frame_stamps.is_none() {
         return Err(counts_frames("CVAT").at(path));
+    }
+    if format == LabelFormat::Parquet {
+        return parquet::write_parquet(path, labels, overwrite);
     }
     atomic::write(path, overwrite, |w: &mut (dyn Write + Send)| -> io::Result<()> {
         match format {

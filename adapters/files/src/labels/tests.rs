@@ -115,7 +115,12 @@ fn the_format_is_found_by_content() {
     assert!(read(&path, None).unwrap_err().to_string().contains("name the data set"));
     let labels = read(&path, Some(&stamps(4))).unwrap();
     assert_eq!(labels.observation_count(), 8);
-    assert!(write(&path, &labels, Overwrite::Replace).unwrap_err().to_string().contains(".csv or .json"));
+    assert!(
+        write(&path, &labels, Overwrite::Replace)
+            .unwrap_err()
+            .to_string()
+            .contains(".csv, .json or .parquet")
+    );
     let json = folder.path().join("labels.JSON");
     write(&json, &labels, Overwrite::Refuse).unwrap();
     assert!(write(&json, &labels, Overwrite::Refuse).unwrap_err().to_string().contains("`force`"));
@@ -210,7 +215,7 @@ fn any_provenance() -> impl Strategy<Value = Provenance> {
         .prop_map(|(confidence, tracker_version, seeded)| Provenance { confidence, tracker_version, seeded })
 }
 
-fn any_labels() -> impl Strategy<Value = LabelSet> {
+pub(super) fn any_labels() -> impl Strategy<Value = LabelSet> {
     let source = prop::sample::select(vec![
         ObservationSource::Manual,
         ObservationSource::Auto,

@@ -14,13 +14,14 @@ use crate::terminal::{self, Outcome};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  vice labels convert floor.csv floor.json\n  \
     vice labels convert labels.pickle labels.csv --dataset V1_01_easy\n  \
-    vice labels convert labels.json cvat.xml --dataset V1_01_easy\n\n\
-    The pickle and CVAT count frames; the data set says which stamps they have.")]
+    vice labels convert labels.json cvat.xml --dataset V1_01_easy\n  \
+    vice labels convert labels.csv labels.parquet\n\n\
+    Parquet and JSON keep everything, CSV and CVAT all but what a tracker says of its work. The pickle and CVAT count frames; the data set says which stamps they have.")]
 pub(crate) struct Args {
-    /// Labels to read: CSV, JSON (vice.labels/1), CVAT for video 1.1 or the authors' pickle.
+    /// Labels to read: CSV, JSON (vice.labels/1), Parquet, CVAT for video 1.1 or the authors' pickle.
     #[arg(value_name = "IN")]
     input: PathBuf,
-    /// File to write: .csv, .json, or .xml for CVAT.
+    /// File to write: .csv, .json, .parquet, or .xml for CVAT.
     #[arg(value_name = "OUT")]
     output: PathBuf,
     /// Data set whose frames a pickle or CVAT counts.

@@ -65,7 +65,7 @@ struct FrameArgs {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Output")]
 struct OutputArgs {
-    /// Labels file to write, .csv or .json.
+    /// Labels file to write, .csv, .json or .parquet.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Add to the labels that the file holds already; what is in it stays as it is.

@@ -9,7 +9,7 @@ use crate::terminal::{Outcome, Verbosity};
 /// What to do with labels.
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Command {
-    /// Convert labels between CSV, JSON and CVAT's XML, or from the authors' pickle.
+    /// Convert labels between CSV, JSON, Parquet and CVAT's XML, or from the authors' pickle.
     Convert(convert::Args),
     /// Label the corners of AprilTags and chessboards by themselves.
     Detect(detect::Args),

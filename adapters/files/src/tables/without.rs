@@ -6,24 +6,29 @@ use std::path::Path;
 use vice_core::error::{DataError, DataResult, ErrorKind};
 
 use super::Column;
-use crate::error::RunResult;
 
-fn none(path: &Path) -> DataError {
+/// The error of a build without Parquet.
+pub(crate) fn unavailable() -> DataError {
     DataError::of_kind(ErrorKind::Unsupported, "this build has no Parquet")
-        .at(path)
         .hint("build VICE with its feature `parquet`")
 }
 
 /// Says that nothing can be read.
-pub(crate) fn read(path: &Path) -> DataResult<Vec<Column>> {
-    Err(none(path))
+///
+/// # Errors
+/// Always.
+pub fn read(path: &Path) -> DataResult<Vec<Column>> {
+    Err(unavailable().at(path))
 }
 
 /// Says that nothing can be written.
-pub(crate) fn write<T>(
+///
+/// # Errors
+/// Always.
+pub fn write<T, E: From<DataError>>(
     path: &Path,
     _: &[Column],
-    _: impl FnOnce(&mut dyn FnMut(&[Column]) -> io::Result<()>) -> RunResult<T>,
-) -> RunResult<T> {
-    Err(none(path).into())
+    _: impl FnOnce(&mut dyn FnMut(&[Column]) -> io::Result<()>) -> Result<T, E>,
+) -> Result<T, E> {
+    Err(unavailable().at(path).into())
 }

@@ -20,7 +20,7 @@ const BATCH: usize = 1 << 16;
 ///
 /// # Errors
 /// [`DataError`] with the path if it is no Parquet file, is damaged, or holds more than text and numbers.
-pub(crate) fn read(path: &Path) -> DataResult<Vec<Column>> {
+pub fn read(path: &Path) -> DataResult<Vec<Column>> {
     let file = File::open(path).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => DataError::of_kind(ErrorKind::Missing, "no such file").at(path),
         _ => DataError::new("cannot be read").at(path).because(e),

@@ -9,9 +9,11 @@ mod read;
 mod write;
 
 #[cfg(feature = "parquet")]
-pub(crate) use read::read;
+pub use read::read;
 #[cfg(feature = "parquet")]
-pub(crate) use write::write;
+pub(crate) use write::{CREATED_BY, ZSTD_LEVEL};
+#[cfg(feature = "parquet")]
+pub use write::{Rows, write};
 
 use std::path::Path;
 use std::sync::Arc;
@@ -26,7 +28,7 @@ pub fn is_parquet(path: &Path) -> bool {
 
 /// The values of a column; `None` where there is none.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Values {
+pub enum Values {
     /// Text.
     Text(Vec<Option<Arc<str>>>),
     /// Numbers in double precision.
@@ -37,22 +39,29 @@ pub(crate) enum Values {
 
 impl Values {
     /// How many.
-    pub(crate) const fn len(&self) -> usize {
+    pub const fn len(&self) -> usize {
         match self {
             Self::Text(values) => values.len(),
             Self::Numbers(values) => values.len(),
             Self::Counts(values) => values.len(),
         }
     }
+
+    /// Whether there is none.
+    pub const fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
 }
 
 /// A column with its name, which ends in its unit where it has one.
-pub(crate) type Column = (String, Values);
+pub type Column = (String, Values);
 
 #[cfg(not(feature = "parquet"))]
 mod without;
 #[cfg(not(feature = "parquet"))]
-pub(crate) use without::{read, write};
+pub(crate) use without::unavailable;
+#[cfg(not(feature = "parquet"))]
+pub use without::{read, write};
 
 #[cfg(test)]
 #[cfg(feature = "parquet")]
@@ -60,6 +69,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
     use std::fs;
+    use vice_core::error::DataError;
 
     fn columns(rows: &[(Option<String>, Option<f64>, Option<i64>)]) -> Vec<Column> {
         vec![
@@ -70,7 +80,8 @@ mod tests {
     }
 
     fn written(path: &Path, parts: &[Vec<Column>]) -> Vec<u8> {
-        write(path, &parts[0], |rows| Ok(parts.iter().try_for_each(|part| rows(part))?)).unwrap();
+        let failed = |e| DataError::new("a part cannot be written").because(e);
+        write(path, &parts[0], |rows| parts.iter().try_for_each(|part| rows(part).map_err(failed))).unwrap();
         fs::read(path).unwrap()
     }
 

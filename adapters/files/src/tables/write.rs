@@ -11,28 +11,27 @@ use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{ColumnPath, Type};
 use vice_core::error::DataError;
-use vice_files::atomic::{self, Overwrite};
 
 use super::{Column, Values};
-use crate::error::RunResult;
+use crate::atomic::{self, Overwrite};
 
 /// The file says who made it, and not which version of the library.
-const CREATED_BY: &str = "vice";
-const ZSTD_LEVEL: i32 = 3;
+pub(crate) const CREATED_BY: &str = "vice";
+pub(crate) const ZSTD_LEVEL: i32 = 3;
 
 /// Takes rows: the columns of the heading again, all of one length.
-pub(crate) type Rows<'a> = dyn FnMut(&[Column]) -> io::Result<()> + 'a;
+pub type Rows<'a> = dyn FnMut(&[Column]) -> io::Result<()> + 'a;
 
 /// Writes a file with columns of these names and kinds, of the rows that `fill` hands over. If that fails there is no
 /// file.
 ///
 /// # Errors
-/// That of `fill`, or [`RunError`](crate::error::RunError) with the path if it cannot be written.
-pub(crate) fn write<T>(
+/// That of `fill`, or [`DataError`] with the path if it cannot be written.
+pub fn write<T, E: From<DataError>>(
     path: &Path,
     heading: &[Column],
-    fill: impl FnOnce(&mut Rows<'_>) -> RunResult<T>,
-) -> RunResult<T> {
+    fill: impl FnOnce(&mut Rows<'_>) -> Result<T, E>,
+) -> Result<T, E> {
     let wrong = |e: ParquetError| DataError::new("cannot be written").at(path).because(e);
     let schema = schema(heading).map_err(wrong)?;
     let settings = settings(heading).map_err(wrong)?;
