@@ -1,5 +1,7 @@
 //! Benchmarks, and what they share: where the data is, and a scan of any size.
 
+pub mod flight;
+
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
