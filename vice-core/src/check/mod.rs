@@ -12,6 +12,7 @@ pub mod inertial;
 pub mod motion;
 pub mod optics;
 pub mod path;
+pub mod pictures;
 pub mod stamps;
 pub mod turning;
 
@@ -33,7 +34,7 @@ pub struct Check {
 }
 
 /// All checks, in the order in which they are made.
-pub const CHECKS: [Check; 8] = [
+pub const CHECKS: [Check; 10] = [
     stamps::CHECK,
     coverage::CHECK,
     clock::CHECK,
@@ -42,4 +43,6 @@ pub const CHECKS: [Check; 8] = [
     inertial::GRAVITY,
     path::CHECK,
     optics::CHECK,
+    pictures::CHECK,
+    pictures::DEPTH,
 ];
