@@ -7,7 +7,6 @@
 pub mod camera_difference;
 pub mod clock;
 pub mod coverage;
-mod finding;
 pub mod inertial;
 pub mod motion;
 pub mod optics;
@@ -16,7 +15,7 @@ pub mod pictures;
 pub mod stamps;
 pub mod turning;
 
-pub use finding::{Finding, Number, State, short};
+pub use crate::finding::{Finding, Number, State, short};
 
 /// What a check is, for `vice check --list`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

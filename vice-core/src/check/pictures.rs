@@ -1,8 +1,8 @@
 //! Pictures that show nothing, the same again, or little: a sample of neighbouring frames.
 
 use super::Check;
-use super::finding::{Finding, State, short};
 use crate::dataset::{DepthImage, Image, PixelFormat};
+use crate::finding::{Finding, State, short};
 use crate::statistics::median;
 
 /// What the check of images is.

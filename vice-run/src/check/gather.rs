@@ -172,6 +172,7 @@ impl Gathered {
         let offsets = self.clocks(&mut found);
         self.motions(&mut found, &offsets);
         self.inertial(&mut found, &offsets);
+        found.extend(self.dataset.checks());
         if images {
             self.pictures(&mut found);
         }

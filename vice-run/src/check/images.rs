@@ -14,6 +14,8 @@ use vice_depth::{
 
 /// Places of the recording that are looked at; at each two neighbouring frames.
 const PLACES: usize = 12;
+/// Frames that follow each other within this are neighbours.
+const NEIGHBOURS: Span = Span::from_millis(210);
 /// Floors fitted to depth, at most.
 const FLOORS: usize = 5;
 /// A floor is off by more than this: metres, and degrees.
@@ -39,10 +41,17 @@ pub(super) fn look(dataset: &dyn Dataset, camera: &str, world: &World3d<'_>) -> 
     let places: Vec<usize> = (0..count).map(|k| (2 * k + 1) * (frames.len() - 1) / (2 * count)).collect();
     let calibrated = dataset.camera(camera).ok();
     let has_depth = dataset.has_depth(camera);
-    let looked: Vec<Looked> = places.par_iter().map(|i| Looked::at(dataset, camera, *i, has_depth)).collect();
+    // What lies far apart is no neighbour: it may be lit otherwise, and show another place.
+    let near = |i: usize| frames[i + 1].since(frames[i]) <= NEIGHBOURS;
+    let looked: Vec<Looked> =
+        places.par_iter().map(|i| Looked::at(dataset, camera, *i, near(*i), has_depth)).collect();
     let pairs: Vec<[Option<Seen>; 2]> = looked.iter().map(|l| l.seen).collect();
     let mut found = images(camera, &pairs, calibrated.as_ref().map(|c| (c.width(), c.height())));
-    if let Some(error) = looked.iter().find_map(|l| l.error.as_ref()) {
+    let error = looked.iter().find_map(|l| l.error.as_ref());
+    if let (Some(error), true) = (error, pairs.iter().flatten().all(Option::is_none)) {
+        return vec![Finding::new("images", camera, State::Unknown, format!("none can be decoded: {error}"))];
+    }
+    if let Some(error) = error {
         found.push(Finding::new("images", camera, State::Look, format!("some cannot be decoded: {error}")));
     }
     if has_depth {
@@ -55,7 +64,10 @@ pub(super) fn look(dataset: &dyn Dataset, camera: &str, world: &World3d<'_>) -> 
         }
         found.extend(floor_by_depth(dataset, camera, &places, world));
     }
-    found.extend(floor_by_cloud(dataset, camera));
+    // The cloud is the same for all cameras.
+    if dataset.cameras().first().is_none_or(|first| first == camera) {
+        found.extend(floor_by_cloud(dataset, camera));
+    }
     found
 }
 
@@ -70,9 +82,9 @@ struct Looked {
 }
 
 impl Looked {
-    fn at(dataset: &dyn Dataset, camera: &str, frame: usize, has_depth: bool) -> Self {
+    fn at(dataset: &dyn Dataset, camera: &str, frame: usize, near: bool, has_depth: bool) -> Self {
         let mut looked = Self::default();
-        for (k, index) in [frame, frame + 1].into_iter().enumerate() {
+        for (k, index) in [frame, frame + 1].into_iter().take(1 + usize::from(near)).enumerate() {
             match dataset.image(camera, index) {
                 Ok(image) => {
                     looked.seen[k] = Some(Seen::of(index, &image));

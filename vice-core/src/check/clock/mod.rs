@@ -25,9 +25,10 @@ use self::coarse::{Lags, correlate};
 use self::fit::{Fit, What, fit};
 use self::parts::Change;
 use self::pieces::Pieces;
-use super::finding::{Finding, State};
+use super::Check;
 use super::turning::Turning;
-use super::{Check, finding::short};
+use crate::finding::short;
+use crate::finding::{Finding, State};
 use crate::time::{Span, Stamp};
 
 /// What this check is.

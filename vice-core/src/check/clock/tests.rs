@@ -2,9 +2,9 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::super::finding::State;
 use super::super::turning::Turning;
 use super::*;
+use crate::finding::State;
 use crate::frames::{Rigid, WorldFromBody};
 use crate::random::SplitMix;
 use crate::trajectory::Trajectory;
