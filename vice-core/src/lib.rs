@@ -26,6 +26,7 @@ pub mod depth_doubt;
 pub mod diagnose;
 pub mod error;
 pub mod evaluate;
+pub mod finding;
 pub mod fleet;
 pub mod frames;
 pub mod imu;

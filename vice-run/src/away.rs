@@ -5,6 +5,7 @@ use std::sync::Arc;
 use vice_core::camera::Camera;
 use vice_core::dataset::{CloudRef, Dataset, DepthImage, Fact, Floor, Image};
 use vice_core::error::DataResult;
+use vice_core::finding::Finding;
 use vice_core::frames::BodyFromCamera;
 use vice_core::imu::{ImuSample, InertialState};
 use vice_core::suspicion::Suspicion;
@@ -98,6 +99,13 @@ impl Dataset for Away {
             ..s
         };
         self.inner.suspicions().into_iter().map(told).collect()
+    }
+
+    fn checks(&self) -> Vec<Finding> {
+        let words = |text: &str| self.place.in_words(text);
+        let told =
+            |f: Finding| Finding { about: words(&f.about), says: words(&f.says), mend: words(&f.mend), ..f };
+        self.inner.checks().into_iter().map(told).collect()
     }
 
     fn facts(&self) -> Vec<Fact> {

@@ -1,6 +1,7 @@
 //! Pose streams: the reference and the estimates, by the data set's names or from files.
 
 mod given;
+mod late;
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -82,6 +83,7 @@ impl StreamsSpec {
             let stream = Stream { name, role: Role::Estimate, trajectory, time_offset, align };
             if let (Some(reference), false) = (&loader.reference, integrates) {
                 loader.suspicions.extend(turned_body(reference, &stream, self.max_gap));
+                loader.suspicions.extend(late::clock(reference, &stream));
             }
             list.push(stream);
         }

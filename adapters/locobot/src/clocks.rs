@@ -4,6 +4,7 @@
 //! poses an hour before theirs, the two machines do not agree on the time, and a pose looked up at the stamp of an image is
 //! that of another moment.
 
+use vice_core::finding::{Finding, State};
 use vice_core::suspicion::Suspicion;
 use vice_core::time::Span;
 
@@ -39,4 +40,61 @@ pub(crate) fn doubt(topics: &[Topic], chosen: &Topics, index: &Index) -> Option<
             ))
             .advice("--time-offset shifts the estimates; `--set stamps=record` takes the time of recording"),
     )
+}
+
+/// Name of the finding about delays.
+const DELAY: &str = "delay";
+/// Delays whose least one moves by more than this, at more than this rate, are two clocks.
+const DRIFT: Span = Span::from_millis(20);
+const DRIFT_SHARE: f64 = 1e-5;
+/// Delays beyond this are another epoch, such as simulated time: their drift is that of the simulation.
+const OTHER_EPOCH: Span = Span::from_millis(1_000_000_000);
+
+/// How long after their stamps the messages of each topic were recorded: a topic whose least delay moves is stamped by a
+/// clock that runs at another rate than the recorder's.
+pub(crate) fn delays(topics: &[Topic], index: &Index) -> Vec<Finding> {
+    let millis = |span: Span| 1e3 * span.as_secs_f64();
+    let mut found = Vec::new();
+    let (mut least, mut most, mut count, mut other) = (f64::INFINITY, f64::NEG_INFINITY, 0_u32, 0_u32);
+    for (topic, Topic { name, .. }) in topics.iter().enumerate() {
+        let Some((low, high)) = index.delays.of(topic) else { continue };
+        if low.abs() > OTHER_EPOCH {
+            other += 1;
+            continue;
+        }
+        count += 1;
+        (least, most) = (least.min(millis(low)), most.max(millis(high)));
+        let Some((drift, time)) = index.delays.drift(topic) else { continue };
+        let share = drift.as_secs_f64() / time.as_secs_f64().max(1e-3);
+        if drift.abs() > DRIFT && share.abs() > DRIFT_SHARE {
+            let says = format!(
+                "the time from stamp to recording moves by {:.0} ms in {:.0} s: its stamps are of a clock that runs at another rate than the recorder's",
+                millis(drift),
+                time.as_secs_f64()
+            );
+            found.push(
+                Finding::new(DELAY, format!("topic {name}"), State::Look, says)
+                    .number("drift", millis(drift), "ms")
+                    .number("rate", 1e6 * share, "ppm")
+                    .number("least", millis(low), "ms")
+                    .number("most", millis(high), "ms")
+                    .mend("where others are stamped by the recorder's clock, `--set stamps=record` takes its time"),
+            );
+        }
+    }
+    if found.is_empty() && count > 0 {
+        let says = format!(
+            "{count} topics were recorded {least:.0} to {most:.0} ms after their stamps, without drift"
+        );
+        found.push(
+            Finding::new(DELAY, "", State::Ok, says).number("least", least, "ms").number("most", most, "ms"),
+        );
+    }
+    if other > 0 {
+        let says = format!(
+            "{other} topics have stamps of another epoch than the recording's, such as simulated time"
+        );
+        found.push(Finding::new(DELAY, "", State::Unknown, says));
+    }
+    found
 }

@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 use vice_core::camera::Camera;
 use vice_core::dataset::{Dataset, DepthImage, Fact, Floor, GROUND_TRUTH, Image, Plane, depth_unit_doubt};
 use vice_core::error::{DataError, DataResult, ErrorKind, one_line};
+use vice_core::finding::Finding;
 use vice_core::frames::{BodyFromCamera, Sensor};
 use vice_core::imu::{ImuSample, InertialState, fit_velocity};
 use vice_core::suspicion::Suspicion;
@@ -50,6 +51,8 @@ pub(crate) struct RosDataset {
     pub(crate) ground_truth: Option<GroundTruth>,
     pub(crate) fixed_camera: Option<Transform>,
     pub(crate) doubts: Doubts,
+    /// How long after their stamps messages were recorded.
+    pub(crate) delays: Vec<Finding>,
     pub(crate) imu: OnceLock<Result<Arc<[ImuSample]>, String>>,
 }
 
@@ -287,6 +290,10 @@ impl Dataset for RosDataset {
             doubts.push(Suspicion::new(NO_CAMERA, "", problem.as_str()).advice(way_out(&self.cameras)));
         }
         doubts
+    }
+
+    fn checks(&self) -> Vec<Finding> {
+        self.delays.clone()
     }
 
     fn facts(&self) -> Vec<Fact> {

@@ -62,6 +62,7 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> DataResult<RosDataset>
         doubts.say(Suspicion::new(SEVERAL_TOPICS, "", format!("none is used: {problem}")));
     }
     doubts.say_all(clocks::doubt(&topics, &chosen, &index));
+    let delays = clocks::delays(&topics, &index);
     let color_topic = chosen.color.map(|t| topics[t].name.as_str());
     let image_frame = chosen.color.and_then(|t| index.images.get(&t)).map(|i| i.frame.clone());
     let tf =
@@ -148,6 +149,7 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> DataResult<RosDataset>
         depth_unit,
         poses,
         ground_truth,
+        delays,
         doubts,
         imu: OnceLock::new(),
     })

@@ -1,6 +1,6 @@
 //! What the pass over a recording keeps of a topic: where its images are, its poses, its calibrations.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use vice_core::suspicion::Suspicion;
 use vice_core::time::{Span, Stamp};
@@ -190,20 +190,67 @@ impl InfoTopic {
 
 /// How long after their stamps the messages of a topic were recorded: the least and the most.
 #[derive(Debug, Default)]
-pub(crate) struct Delays(BTreeMap<usize, (Span, Span)>);
+pub(crate) struct Delays(BTreeMap<usize, Delay>);
 
 impl Delays {
     /// Adds a message of a topic.
     pub(crate) fn add(&mut self, topic: usize, stamp: Stamp, recorded: Stamp) {
         if stamp.as_nanos() != 0 && recorded.as_nanos() != 0 {
             let delay = recorded.since(stamp);
-            let (least, most) = self.0.entry(topic).or_insert((delay, delay));
-            (*least, *most) = ((*least).min(delay), (*most).max(delay));
+            self.0.entry(topic).or_insert_with(|| Delay::new(delay)).add(stamp, delay);
         }
     }
 
     /// The least and the most of a topic.
     pub(crate) fn of(&self, topic: usize) -> Option<(Span, Span)> {
-        self.0.get(&topic).copied()
+        self.0.get(&topic).map(|d| (d.least, d.most))
+    }
+
+    /// By how much the least delay grew from the first messages of a topic to its last ones, and the time between; `None`
+    /// for few messages. The least of many is what the clocks differ by: queues only add to it.
+    pub(crate) fn drift(&self, topic: usize) -> Option<(Span, Span)> {
+        let delay = self.0.get(&topic).filter(|d| d.count > 4 * WINDOW)?;
+        let last = delay.last.iter().min_by_key(|(_, delay)| *delay)?;
+        Some((last.1 - delay.first.1, last.0.since(delay.first.0)))
+    }
+}
+
+/// Messages at either end of a topic whose least delays are compared.
+const WINDOW: usize = 50;
+
+/// How long after its stamp a topic's messages were recorded.
+#[derive(Debug)]
+struct Delay {
+    least: Span,
+    most: Span,
+    count: usize,
+    /// Stamp and delay of the least of the first ones.
+    first: (Stamp, Span),
+    /// Stamps and delays of the last ones.
+    last: VecDeque<(Stamp, Span)>,
+}
+
+impl Delay {
+    fn new(delay: Span) -> Self {
+        Self {
+            least: delay,
+            most: delay,
+            count: 0,
+            first: (Stamp::from_nanos(0), delay),
+            last: VecDeque::new(),
+        }
+    }
+
+    fn add(&mut self, stamp: Stamp, delay: Span) {
+        self.least = self.least.min(delay);
+        self.most = self.most.max(delay);
+        if self.count == 0 || (self.count < WINDOW && delay < self.first.1) {
+            self.first = (stamp, delay);
+        }
+        self.count += 1;
+        if self.last.len() == WINDOW {
+            self.last.pop_front();
+        }
+        self.last.push_back((stamp, delay));
     }
 }

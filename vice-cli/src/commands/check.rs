@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use vice_run::check::{CheckRequest, check, list_text, render};
+use vice_run::check::{CheckRequest, check, list_text, page, render};
 use vice_run::core::check::State;
 use vice_run::core::conventions::Convention;
 use vice_run::core::time::Span;
@@ -49,6 +49,12 @@ pub(crate) struct Args {
     /// Widest gap between two poses that is interpolated, seconds.
     #[arg(long, value_name = "S", default_value = "0.1", value_parser = span_not_negative)]
     max_gap: Span,
+    /// Also decode a sample of images and depth images, and read the cloud.
+    #[arg(long)]
+    images: bool,
+    /// The findings as a page.
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
     /// Document vice.check/1; - prints it in place of the text.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -60,6 +66,7 @@ impl Args {
         dataset.calibration.clone_from(&self.calibration);
         CheckRequest {
             dataset,
+            images: self.images,
             streams: StreamsSpec {
                 estimates: split_list(&self.estimate).into_iter().map(EstimateSpec::from).collect(),
                 reference: ReferenceSpec::from(self.reference.clone()),
@@ -80,11 +87,14 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         return Ok(Outcome::Done);
     }
     let request = args.request();
-    let outputs = Outputs::new(&[&args.json], &request.inputs())?;
+    let outputs = Outputs::new(&[&args.json, &args.report], &request.inputs())?;
     let document = check(&request)?;
     let mut texts = Vec::new();
     if let Some(path) = &args.json {
         texts.push((path, to_json(&document)?));
+    }
+    if let Some(path) = &args.report {
+        texts.push((path, page(&document)));
     }
     if !outputs.write(&texts)? {
         terminal::print(&render(&document))?;

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use vice_run::check::{CheckRequest, check, head};
 use vice_run::core::dataset::Probe;
 use vice_run::formats;
 use vice_run::info::describe;
@@ -32,7 +33,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     if spec.camera.is_some() {
         spec.camera_name(dataset.as_ref())?;
     }
-    terminal::print(&describe(dataset.as_ref(), spec.camera.as_deref())?)?;
+    let checked = check(&CheckRequest { dataset: spec.clone(), ..CheckRequest::default() }).ok();
+    let text = describe(dataset.as_ref(), spec.camera.as_deref())?;
+    let head = checked.map_or_else(String::new, |document| head(&document));
+    terminal::print(&match text.split_once('\n') {
+        Some((first, rest)) => format!("{first}\n{head}{rest}"),
+        None => text,
+    })?;
     Ok(Outcome::Done)
 }
 

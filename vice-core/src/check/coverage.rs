@@ -1,7 +1,7 @@
 //! Whether poses are there when frames are taken, and by the same clock.
 
 use super::Check;
-use super::finding::{Finding, State, short};
+use crate::finding::{Finding, State, short};
 use crate::time::{Span, Stamp};
 use crate::time_unit::mixed_up;
 use crate::trajectory::{NoPose, Trajectory};

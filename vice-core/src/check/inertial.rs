@@ -8,10 +8,10 @@
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use super::Check;
-use super::finding::{Finding, State};
 use super::motion::{hypotheses, kept_rms};
 use super::turning::Turning;
 use crate::conventions::{Given, cure, list_text};
+use crate::finding::{Finding, State};
 use crate::frames::rotation_vector_rad;
 use crate::imu::ImuSample;
 use crate::statistics::median;

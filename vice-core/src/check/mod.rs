@@ -7,15 +7,15 @@
 pub mod camera_difference;
 pub mod clock;
 pub mod coverage;
-mod finding;
 pub mod inertial;
 pub mod motion;
 pub mod optics;
 pub mod path;
+pub mod pictures;
 pub mod stamps;
 pub mod turning;
 
-pub use finding::{Finding, Number, State, short};
+pub use crate::finding::{Finding, Number, State, short};
 
 /// What a check is, for `vice check --list`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +33,7 @@ pub struct Check {
 }
 
 /// All checks, in the order in which they are made.
-pub const CHECKS: [Check; 8] = [
+pub const CHECKS: [Check; 10] = [
     stamps::CHECK,
     coverage::CHECK,
     clock::CHECK,
@@ -42,4 +42,6 @@ pub const CHECKS: [Check; 8] = [
     inertial::GRAVITY,
     path::CHECK,
     optics::CHECK,
+    pictures::CHECK,
+    pictures::DEPTH,
 ];

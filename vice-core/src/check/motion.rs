@@ -6,8 +6,8 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::Check;
-use super::finding::{Finding, State};
 use crate::conventions::{Convention, Given, cure, list_text};
+use crate::finding::{Finding, State};
 use crate::frames::{Body, Rigid, WorldFromBody, rotation_angle_rad, rotation_vector_rad};
 use crate::metrics::align::best_rotation;
 use crate::statistics::sorted;

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use super::Check;
-use super::finding::{Finding, State, short};
 use crate::camera::{Camera, Pixel};
+use crate::finding::{Finding, State, short};
 use crate::frames::{BodyFromCamera, rotation_angle_rad};
 
 /// What this check is.

@@ -1,7 +1,7 @@
 //! What no robot's path does: jumps, frozen stretches, speeds of another unit.
 
 use super::Check;
-use super::finding::{Finding, State, short};
+use crate::finding::{Finding, State, short};
 use crate::frames::rotation_angle_rad;
 use crate::statistics::{quantile, sorted};
 use crate::trajectory::Trajectory;

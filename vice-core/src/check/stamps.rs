@@ -1,7 +1,7 @@
 //! Stamps of one sensor or stream: gaps, jitter, drops.
 
 use super::Check;
-use super::finding::{Finding, State, short};
+use crate::finding::{Finding, State, short};
 use crate::statistics::{quantile, sorted};
 use crate::time::Stamp;
 

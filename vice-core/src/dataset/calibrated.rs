@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::{CloudRef, Dataset, DepthImage, Fact, Floor, Image};
 use crate::camera::Camera;
 use crate::error::DataResult;
+use crate::finding::Finding;
 use crate::frames::BodyFromCamera;
 use crate::imu::{ImuSample, InertialState};
 use crate::suspicion::Suspicion;
@@ -129,6 +130,10 @@ impl Dataset for Calibrated {
 
     fn suspicions(&self) -> Vec<Suspicion> {
         self.inner.suspicions()
+    }
+
+    fn checks(&self) -> Vec<Finding> {
+        self.inner.checks()
     }
 
     fn facts(&self) -> Vec<Fact> {

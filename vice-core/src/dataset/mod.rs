@@ -22,6 +22,7 @@ pub use plane::{Floor, Plane};
 
 use crate::camera::Camera;
 use crate::error::DataResult;
+use crate::finding::Finding;
 use crate::frames::{BodyFromCamera, Cloud, Rigid, World};
 use crate::imu::{ImuSample, InertialState};
 use crate::suspicion::Suspicion;
@@ -138,6 +139,12 @@ pub trait Dataset: Send + Sync {
 
     /// What looked wrong when the data set was opened and read so far, each said once. Asked after the data was read.
     fn suspicions(&self) -> Vec<Suspicion> {
+        Vec::new()
+    }
+
+    /// What the format's own checks find, beside those of [`check`](crate::check) that know no format: their names are the
+    /// format's. Asked by `vice check`; nothing large is read for it.
+    fn checks(&self) -> Vec<Finding> {
         Vec::new()
     }
 

@@ -16,6 +16,7 @@ use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
 
 use super::CheckRequest;
+use super::images::{self, World3d};
 use crate::error::{RunError, RunResult};
 use crate::formats;
 use crate::open::Opened;
@@ -161,7 +162,7 @@ impl Gathered {
     }
 
     /// All findings.
-    pub(super) fn findings(&self) -> Vec<Finding> {
+    pub(super) fn findings(&self, images: bool) -> Vec<Finding> {
         let mut found = self.read.clone();
         self.stamps(&mut found);
         self.calibration(&mut found);
@@ -171,6 +172,10 @@ impl Gathered {
         let offsets = self.clocks(&mut found);
         self.motions(&mut found, &offsets);
         self.inertial(&mut found, &offsets);
+        found.extend(self.dataset.checks());
+        if images {
+            self.pictures(&mut found);
+        }
         // Asked last: readers doubt while they read.
         let mut suspicions: Suspicions = self.dataset.suspicions().into_iter().collect();
         suspicions.extend(self.suspicions.iter().cloned());
@@ -212,6 +217,20 @@ impl Gathered {
                 Some(Err(error)) => found.push(unread(camera, &error)),
                 None => {}
             }
+        }
+    }
+
+    fn pictures(&self, found: &mut Vec<Finding>) {
+        let anchor = self.streams.iter().find(|s| s.is_reference).map(|s| &s.trajectory);
+        for camera in &self.cameras {
+            found.extend(images::look(
+                self.dataset.as_ref(),
+                camera,
+                &World3d { anchor, max_gap: self.max_gap },
+            ));
+        }
+        if self.cameras.is_empty() {
+            found.push(Finding::new("images", "", State::Unknown, "there is no camera"));
         }
     }
 

@@ -6,6 +6,8 @@
 mod calibration_diff;
 mod clock;
 mod gather;
+mod images;
+mod page;
 mod text;
 
 use std::path::PathBuf;
@@ -15,7 +17,8 @@ use vice_core::check::{CHECKS, Finding, State};
 
 pub use calibration_diff::{CalibrationDiffDocument, CalibrationDiffRequest, compare_calibrations};
 pub use clock::{ClockDocument, ClockRequest, compare_clocks};
-pub use text::{list_text, render};
+pub use page::page;
+pub use text::{head, list_text, render};
 
 use crate::error::RunResult;
 use crate::request::{DatasetSpec, Request, StreamsSpec};
@@ -29,6 +32,9 @@ pub struct CheckRequest {
     /// The pose streams beside its own.
     #[serde(default)]
     pub streams: StreamsSpec,
+    /// Also look at a sample of images and depth images, and at the cloud.
+    #[serde(default)]
+    pub images: bool,
 }
 
 /// The document `vice.check/1`.
@@ -77,7 +83,7 @@ impl CheckRequest {
 /// [`RunError`](crate::error::RunError) if no format reads it, or a stream that is named cannot be read.
 pub fn check(request: &CheckRequest) -> RunResult<CheckDocument> {
     let gathered = gather::gather(request)?;
-    let mut findings = gathered.findings();
+    let mut findings = gathered.findings(request.images);
     findings.sort_by_key(place);
     let count = |state: State| findings.iter().filter(|f| f.state == state).count();
     Ok(CheckDocument {

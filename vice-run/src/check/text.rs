@@ -27,6 +27,20 @@ pub fn render(document: &CheckDocument) -> String {
     text
 }
 
+/// What is wrong or worth a look, a line each, for the head of another text; nothing where nothing is. What readers said
+/// stands in that text by itself.
+pub fn head(document: &CheckDocument) -> String {
+    let mut text = String::new();
+    for state in [State::Wrong, State::Look] {
+        for f in document.findings.iter().filter(|f| f.state == state && f.check != "reading") {
+            let about = if f.about.is_empty() { String::new() } else { format!("{}: ", f.about) };
+            let line = format!("  {:6}{:12}{about}{}", state.word(), f.check, with_options(&f.says));
+            text.push_str(&format!("{}\n", printable(&line)));
+        }
+    }
+    if text.is_empty() { text } else { format!("checks (more with `vice check`)\n{text}") }
+}
+
 /// One finding, with its numbers and its cure on lines of their own where there is something to do.
 pub(crate) fn line(finding: &Finding) -> String {
     let about = if finding.about.is_empty() { String::new() } else { format!("{}: ", finding.about) };

@@ -67,7 +67,7 @@ pub(super) fn fit(
     free_rate: bool,
 ) -> Option<Fit> {
     let (mut lag, mut rate) = start;
-    let middle_s = pieces.ends.iter().map(|(a, b)| 0.5 * (a + b)).sum::<f64>() / pieces.len().max(1) as f64;
+    let middle_s = pieces.middle_s();
     let h = (0.5 * other.spacing_s()).max(0.002);
     let mut weights = vec![1.0; pieces.len()];
     for step in 0..STEPS {

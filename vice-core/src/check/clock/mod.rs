@@ -14,6 +14,7 @@
 
 mod coarse;
 mod fit;
+mod parts;
 mod pieces;
 #[cfg(test)]
 mod tests;
@@ -22,10 +23,12 @@ use nalgebra::UnitQuaternion;
 
 use self::coarse::{Lags, correlate};
 use self::fit::{Fit, What, fit};
+use self::parts::Change;
 use self::pieces::Pieces;
-use super::finding::{Finding, State};
+use super::Check;
 use super::turning::Turning;
-use super::{Check, finding::short};
+use crate::finding::short;
+use crate::finding::{Finding, State};
 use crate::time::{Span, Stamp};
 
 /// What this check is.
@@ -140,6 +143,16 @@ pub enum ClockDoubt {
         /// Where, seconds.
         next_s: f64,
     },
+    /// The clock was set in the middle.
+    #[error("the offset steps from {:.1} to {:.1} ms at about {at} ns", 1e3 * before_s, 1e3 * after_s)]
+    Step {
+        /// When, by the stamps of the sparser one, within some seconds.
+        at: Stamp,
+        /// The offset before, seconds to add to the estimate's stamps.
+        before_s: f64,
+        /// The offset after, seconds.
+        after_s: f64,
+    },
     /// The interval is too wide.
     #[error("too uncertain: {:.1} ± {:.1} ms", 1e3 * offset_s, 1e3 * half_95_s)]
     TooWide {
@@ -181,7 +194,14 @@ pub fn clock_offset(
             Err(error) => doubt = doubt.or(Some(error)),
         }
     }
-    Err(doubt.unwrap_or(ClockDoubt::TooShort { seconds: 0.0, count: 0 }))
+    let doubt = doubt.unwrap_or(ClockDoubt::TooShort { seconds: 0.0, count: 0 });
+    // A constant offset does not fit: perhaps one that changes does.
+    match doubt {
+        ClockDoubt::Uncorrelated { .. } | ClockDoubt::TooWide { .. } => {
+            search.changing(range_s.unwrap_or(RANGES_S[0])).unwrap_or(Err(doubt))
+        }
+        doubt => Err(doubt),
+    }
 }
 
 struct Search<'a> {
@@ -243,6 +263,25 @@ impl<'a> Search<'a> {
             return Err(ClockDoubt::TooWide { offset_s, half_95_s: best.lag_half_s });
         }
         Ok(self.answer(&best, what, next))
+    }
+
+    /// What parts say, where no constant lag fits.
+    fn changing(&self, range_s: f64) -> Option<Result<ClockOffset, ClockDoubt>> {
+        let offset = |lag: f64| self.sign * (lag - self.apart_s);
+        match parts::change(&self.pieces, self.other, self.apart_s, range_s)? {
+            Change::Step(at, before, after) => Some(Err(ClockDoubt::Step {
+                at: self.sparse.range().0.saturating_add(Span::from_secs_f64(at).unwrap_or(Span::ZERO)),
+                before_s: offset(before),
+                after_s: offset(after),
+            })),
+            Change::Rate(lag, rate) => {
+                let found = fit(&self.pieces, self.other, What::Vectors, (lag, rate), true)?;
+                let sure = found.correlation >= LEAST_CORRELATION
+                    && found.rate.abs() > found.rate_half
+                    && found.lag_half_s < WIDEST_S.max(WIDEST_SHARE * offset(found.lag_s).abs());
+                sure.then(|| Ok(self.answer(&found, What::Vectors, None)))
+            }
+        }
     }
 
     fn uncorrelated(&self, correlation: f64, lag_s: f64) -> ClockDoubt {
@@ -318,6 +357,13 @@ pub fn finding(reference: &str, estimate: &str, found: &Result<ClockOffset, Cloc
     let about = format!("{reference} / {estimate}");
     let found = match found {
         Ok(found) => found,
+        Err(doubt @ ClockDoubt::Step { before_s, after_s, .. }) => {
+            let says = format!("the clock of {estimate} or of {reference} was set: {doubt}");
+            return Finding::new(CHECK.name, about, State::Wrong, says)
+                .number("before", 1e3 * before_s, "ms")
+                .number("after", 1e3 * after_s, "ms")
+                .mend("no constant offset mends a step: correct the stamps at their source, or use one part with `start` and `duration`");
+        }
         Err(doubt) => return Finding::new(CHECK.name, about, State::Unknown, doubt.to_string()),
     };
     let beyond = (found.offset_s.abs() - found.half_95_s).max(0.0);
@@ -335,7 +381,15 @@ pub fn finding(reference: &str, estimate: &str, found: &Result<ClockOffset, Cloc
         ),
         _ if beyond > LOOK_S => {
             let late = if found.offset_s < 0.0 { "late" } else { "early" };
-            format!("the stamps of {estimate} are {:.1} ms {late} against {reference}", ms.abs())
+            let moves = match certain > LOOK_S {
+                true => format!(
+                    ", and the offset moves by {:.1} ms in {:.0} s",
+                    1e3 * found.grows_s(),
+                    found.seconds
+                ),
+                false => String::new(),
+            };
+            format!("the stamps of {estimate} are {:.1} ms {late} against {reference}{moves}", ms.abs())
         }
         _ => format!(
             "the clock of {estimate} runs at another rate than that of {reference}: the offset moves by {:.1} ms in {:.0} s",

@@ -55,6 +55,18 @@ impl Pieces {
         }
     }
 
+    /// Those that lie between two times, seconds since the source's origin.
+    pub(super) fn between(&self, from: f64, to: f64) -> Self {
+        let kept = self.ends.iter().zip(&self.rates).filter(|(e, _)| e.0 >= from && e.1 <= to);
+        let (ends, rates) = kept.map(|(e, r)| (*e, *r)).unzip();
+        Self { ends, rates }
+    }
+
+    /// Mean of their middles, seconds since the source's origin.
+    pub(super) fn middle_s(&self) -> f64 {
+        self.ends.iter().map(|(a, b)| 0.5 * (a + b)).sum::<f64>() / self.len().max(1) as f64
+    }
+
     /// Seconds from the first to the last.
     pub(super) fn seconds(&self) -> f64 {
         match (self.ends.first(), self.ends.last()) {

@@ -2,9 +2,9 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::super::finding::State;
 use super::super::turning::Turning;
 use super::*;
+use crate::finding::State;
 use crate::frames::{Rigid, WorldFromBody};
 use crate::random::SplitMix;
 use crate::trajectory::Trajectory;
@@ -97,6 +97,32 @@ fn rates_are_found() {
         assert!((rate.share + share).abs() < 2.0 * rate.half_95.max(1e-5), "{share}: {rate:?}");
         assert!(found.offset_s.abs() < 2e-3, "{found:?}");
         assert_eq!(finding("a", "b", &Ok(found)).state, State::Wrong);
+    }
+}
+
+#[test]
+fn a_wrong_frame_rate_and_a_clock_that_is_set_are_told_by_parts() {
+    let reference = gyro(200.0, 60.0, 1.0);
+    for share in [0.05, -0.02] {
+        let found = clock_offset(&reference, &poses(50.0, 60.0, 1.0, 0.0, share, 1e-3), None).unwrap();
+        let rate = found.rate.unwrap().share;
+        // Seconds of the estimate are longer by the share.
+        assert!((rate + share / (1.0 + share)).abs() < 1e-3, "{share}: {found:?}");
+    }
+    let plain = poses(50.0, 60.0, 1.0, 0.0, 0.0, 1e-3);
+    let (start, _) = plain.range();
+    let rows = plain.times().iter().zip(plain.rotations()).map(|(t, r)| {
+        let late = if *t > 25.0 { 0.15 } else { 0.0 };
+        let at = start + Span::from_secs_f64(t + late).unwrap();
+        (at, WorldFromBody::from_parts(Vector3::zeros(), *r))
+    });
+    let stepped = Turning::of_poses(&Trajectory::from_poses(rows.collect::<Vec<_>>()).unwrap()).unwrap();
+    match clock_offset(&reference, &stepped, None) {
+        Err(ClockDoubt::Step { at, before_s, after_s }) => {
+            assert!(before_s.abs() < 5e-3 && (after_s + 0.15).abs() < 5e-3, "{before_s} {after_s}");
+            assert!((at.since(start).as_secs_f64() - 25.0).abs() < 5.0, "{at}");
+        }
+        other => panic!("{other:?}"),
     }
 }
 

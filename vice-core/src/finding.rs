@@ -1,4 +1,4 @@
-//! What a check says: a state, a sentence, numbers, and what mends it.
+//! What a check says of a recording: a state, a sentence, numbers, and what mends it.
 
 use crate::suspicion::Suspicion;
 
@@ -46,7 +46,7 @@ pub struct Number {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Finding {
-    /// Name of the check, in kebab-case: one of [`super::CHECKS`], or a name that a format gave its own.
+    /// Name of the check, in kebab-case: one of [`CHECKS`](crate::check::CHECKS), or a name that a format gave its own.
     pub check: String,
     /// What was looked at: a stream, a camera, a pair of them; empty for the whole data set.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "String::is_empty"))]
