@@ -127,7 +127,7 @@ pub fn import(
         let old = document.point(&point.name).into_iter().flat_map(|p| p.keys());
         cells.extend(old.filter(|s| !kept.contains(s)).filter_map(|s| document.cell(&point.name, *s, None)));
         cells.extend(point.observations.iter().filter_map(|o| {
-            document.cell(&point.name, o.stamp, Some(vice_core::label::Observation { line: 0, ..*o }))
+            document.cell(&point.name, o.stamp, Some(vice_core::label::Observation { line: 0, ..o }))
         }));
     }
     Ok(cells)

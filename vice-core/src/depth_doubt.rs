@@ -11,8 +11,9 @@ use crate::parallel::*;
 use nalgebra::{Point3, Vector3};
 
 use crate::camera::{Camera, Pixel};
-use crate::frames::{self, Rigid};
+use crate::frames::WorldFromCamera;
 use crate::statistics::{median, quantile, sorted};
+use crate::track::{CameraPath, track_along};
 
 /// Depths from a tenth to ten times the one that was used are tried.
 const FARTHEST: f64 = 10.0;
@@ -57,9 +58,72 @@ const MEDIAN_LENGTH: f64 = 1.1774;
 #[derive(Clone, Debug)]
 pub struct LiftedTrack {
     /// The point in the camera of the key frame, metres, with the depth that was used.
-    pub point_camera_m: Point3<f64>,
-    /// The camera of the key frame in that of each later frame, and where the label is there.
-    pub views: Vec<(Rigid<frames::Camera, frames::Camera>, Pixel)>,
+    point_camera_m: Point3<f64>,
+    at_keyframe: WorldFromCamera,
+    /// Where the camera is in each later frame, and where the label is there.
+    cameras: CameraPath,
+    label_px: [Vec<f64>; 2],
+}
+
+impl LiftedTrack {
+    /// A point in the camera of its key frame, and where later cameras are and see it: of more views than tell something new
+    /// some, evenly.
+    pub fn new(
+        point_camera_m: Point3<f64>,
+        at_keyframe: WorldFromCamera,
+        views: &[(WorldFromCamera, Pixel)],
+    ) -> Self {
+        let path = CameraPath::new(views.iter().map(|(camera, _)| Some(*camera)));
+        let labels: Vec<(usize, Pixel)> = views.iter().map(|(_, label)| *label).enumerate().collect();
+        Self::along(point_camera_m, at_keyframe, &path, &labels)
+    }
+
+    /// The same of places of a path.
+    pub(crate) fn along(
+        point_camera_m: Point3<f64>,
+        at_keyframe: WorldFromCamera,
+        path: &CameraPath,
+        labels: &[(usize, Pixel)],
+    ) -> Self {
+        let n = labels.len();
+        let thinned: Vec<(usize, Pixel)> = match n {
+            0..=MOST_VIEWS => labels.to_vec(),
+            _ => (0..MOST_VIEWS).map(|i| labels[i * (n - 1) / (MOST_VIEWS - 1)]).collect(),
+        };
+        let label_px = [thinned.iter().map(|l| l.1.u).collect(), thinned.iter().map(|l| l.1.v).collect()];
+        let cameras = path.some(thinned.iter().map(|l| l.0));
+        Self { point_camera_m, at_keyframe, cameras, label_px }
+    }
+
+    fn views(&self) -> usize {
+        self.label_px[0].len()
+    }
+}
+
+/// Key points that are lifted where they are asked for.
+pub trait LiftedTracks: Sync {
+    /// How many.
+    fn count(&self) -> usize;
+
+    /// Whether one has so many views.
+    fn has_views(&self, track: usize, views: usize) -> bool;
+
+    /// One of them.
+    fn get(&self, track: usize) -> LiftedTrack;
+}
+
+impl LiftedTracks for [LiftedTrack] {
+    fn count(&self) -> usize {
+        self.len()
+    }
+
+    fn has_views(&self, track: usize, views: usize) -> bool {
+        self[track].views() >= views
+    }
+
+    fn get(&self, track: usize) -> LiftedTrack {
+        self[track].clone()
+    }
 }
 
 /// A depth that explains a point's labels better than the one that was used.
@@ -83,13 +147,12 @@ pub struct Doubts {
 }
 
 /// The points whose depth is doubtful.
-pub fn doubts(camera: &Camera, tracks: &[LiftedTrack]) -> Doubts {
-    let thinned: Vec<LiftedTrack> = tracks.par_iter().map(thin).collect();
-    let useful: Vec<usize> = (0..tracks.len()).filter(|i| thinned[*i].views.len() >= FEWEST_VIEWS).collect();
+pub fn doubts(camera: &Camera, tracks: &(impl LiftedTracks + ?Sized)) -> Doubts {
+    let useful: Vec<usize> = (0..tracks.count()).filter(|i| tracks.has_views(*i, FEWEST_VIEWS)).collect();
     let step = useful.len().div_ceil(MOST_FOR_NOISE).max(1);
     let sample: Vec<usize> = useful.iter().copied().step_by(step).collect();
     let fit = |noise_px: f64| move |track: &LiftedTrack| Fitter { camera, track, noise_px }.fit();
-    let rough: Vec<Fit> = sample.par_iter().filter_map(|i| fit(1.0)(&thinned[*i])).collect();
+    let rough: Vec<Fit> = sample.par_iter().filter_map(|i| fit(1.0)(&tracks.get(*i))).collect();
     let Some(left) = median(&mut rough.iter().map(|f| f.error_then_px).collect::<Vec<_>>()) else {
         return Doubts::default();
     };
@@ -97,7 +160,7 @@ pub fn doubts(camera: &Camera, tracks: &[LiftedTrack]) -> Doubts {
     let fits: Vec<(usize, Fit)> = useful
         .par_iter()
         .filter_map(|i| {
-            let fitter = Fitter { camera, track: &thinned[*i], noise_px };
+            let fitter = Fitter { camera, track: &tracks.get(*i), noise_px };
             // What fits as it is needs no other depth; the sample is fitted for what its depths differ by.
             let wanted = i % step == 0 || fitter.at(1.0).is_none_or(|c| c.cost > GAIN);
             if wanted { Some((*i, fitter.fit()?)) } else { None }
@@ -127,15 +190,6 @@ fn common(fits: &[(usize, Fit)], clear: impl Fn(&Fit) -> bool) -> Option<(f64, u
     let spread = quantile(&logs, 0.75)? - quantile(&logs, 0.25)?;
     let middle = quantile(&logs, 0.5)?;
     (middle.abs() > LEAST_OFF_LOG && spread < COMMON_LOG).then(|| (middle.exp(), n, fits.len()))
-}
-
-fn thin(track: &LiftedTrack) -> LiftedTrack {
-    let n = track.views.len();
-    if n <= MOST_VIEWS {
-        return track.clone();
-    }
-    let views = (0..MOST_VIEWS).map(|i| track.views[i * (n - 1) / (MOST_VIEWS - 1)]).collect();
-    LiftedTrack { views, ..*track }
 }
 
 /// The best depth of a point.
@@ -202,11 +256,16 @@ impl Fitter<'_> {
     /// The cost of a depth times `factor`; `None` where a view does not see the point then.
     fn at(&self, factor: f64) -> Option<Cost> {
         let point = Point3::from(self.track.point_camera_m.coords * factor);
-        let mut residuals = Vec::with_capacity(self.track.views.len());
-        for (now_from_keyframe, label) in &self.track.views {
-            let seen = self.camera.project(&now_from_keyframe.transform_point(&point)).ok()?;
-            residuals.push([seen.u - label.u, seen.v - label.v]);
+        let LiftedTrack { at_keyframe, cameras, label_px: [label_u, label_v], .. } = self.track;
+        let n = self.track.views();
+        // No more views are kept than these have room for.
+        let (mut u, mut v, mut valid) = ([0.0; MOST_VIEWS], [0.0; MOST_VIEWS], [false; MOST_VIEWS]);
+        let (u, v, valid) = (&mut u[..n], &mut v[..n], &mut valid[..n]);
+        if track_along(self.camera, at_keyframe, &point, (cameras, 0..n), [&mut *u, &mut *v], valid) < n {
+            return None;
         }
+        let residual = |i: usize| [u[i] - label_u[i], v[i] - label_v[i]];
+        let residuals: Vec<[f64; 2]> = (0..n).map(residual).collect();
         // The label of the key frame may be off a little, which moves all views by about as much.
         let (noise2, blunder2) = (self.noise_px.powi(2), (BLUNDER * self.noise_px).powi(2));
         let prior = 1.0 / (KEYFRAME_DEVIATIONS * KEYFRAME_DEVIATIONS);
@@ -237,6 +296,7 @@ fn length(v: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
     use crate::camera::Model;
+    use crate::frames::Rigid;
     use crate::random::SplitMix;
     use nalgebra::UnitQuaternion;
 
@@ -256,12 +316,13 @@ mod tests {
         let view = |i: usize| {
             let t = 0.1 * i as f64;
             let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.01 * t, 0.03 * t, 0.0));
-            let now: Rigid<frames::Camera, frames::Camera> = Rigid::from_parts(-t * speed, turn);
-            let told = Rigid::from_parts(-t * scale * speed, turn);
-            let seen = camera().project(&now.transform_point(&truth)).unwrap();
+            let now: WorldFromCamera = Rigid::from_parts(-t * speed, turn).inverse();
+            let told: WorldFromCamera = Rigid::from_parts(-t * scale * speed, turn).inverse();
+            let seen = camera().project(&now.inverse().transform_point(&truth)).unwrap();
             (told, Pixel::new(seen.u + noise(), seen.v + noise()))
         };
-        LiftedTrack { views: (1..=40).map(view).collect(), point_camera_m: truth * used }
+        let views: Vec<_> = (1..=40).map(view).collect();
+        LiftedTrack::new(truth * used, Rigid::identity(), &views)
     }
 
     #[test]
@@ -271,7 +332,7 @@ mod tests {
             let tracks: Vec<LiftedTrack> = (0..20)
                 .map(|i| track(&mut random, if i % 2 == 0 { 1.0 } else { 1.3 + 0.1 * f64::from(i) }, 1.0))
                 .collect();
-            let found = doubts(&camera(), &tracks);
+            let found = doubts(&camera(), &tracks[..]);
             assert_eq!(found.points.iter().map(|p| p.0 % 2).collect::<Vec<_>>(), [1; 10], "seed {seed}");
             for (i, better) in &found.points {
                 let expected = 1.0 / (1.3 + 0.1 * *i as f64);
@@ -286,7 +347,7 @@ mod tests {
     fn a_scale_of_the_motion_is_not_blamed_on_the_points() {
         let mut random = SplitMix::new(3);
         let tracks: Vec<LiftedTrack> = (0..12).map(|_| track(&mut random, 1.0, 1.5)).collect();
-        let found = doubts(&camera(), &tracks);
+        let found = doubts(&camera(), &tracks[..]);
         assert!(found.points.is_empty(), "{found:?}");
         let (factor, n, of) = found.common.unwrap();
         assert!((factor / 1.5 - 1.0).abs() < 0.05 && n >= 10 && of == 12, "{factor} {n} {of}");
@@ -298,15 +359,16 @@ mod tests {
         let mut tracks: Vec<LiftedTrack> =
             (0..8).map(|i| track(&mut random, 1.0 + f64::from(i), 0.0)).collect();
         // The camera stands, and so do the labels.
-        for track in &mut tracks {
-            let seen = track.views[0].1;
-            track.views.iter_mut().for_each(|v| *v = (Rigid::identity(), seen));
+        let standing = |track: &LiftedTrack, views: usize| {
+            let seen = Pixel::new(track.label_px[0][0], track.label_px[1][0]);
             let ray = camera().unproject(seen).unwrap();
-            track.point_camera_m = Point3::from(ray * track.point_camera_m.z);
-        }
-        assert_eq!(doubts(&camera(), &tracks), Doubts::default());
-        assert_eq!(doubts(&camera(), &[]), Doubts::default());
-        tracks.iter_mut().for_each(|t| t.views.truncate(2));
-        assert_eq!(doubts(&camera(), &tracks), Doubts::default());
+            let point = Point3::from(ray * track.point_camera_m.z);
+            LiftedTrack::new(point, Rigid::identity(), &vec![(Rigid::identity(), seen); views])
+        };
+        tracks.iter_mut().for_each(|track| *track = standing(track, 40));
+        assert_eq!(doubts(&camera(), &tracks[..]), Doubts::default());
+        assert_eq!(doubts(&camera(), &[][..]), Doubts::default());
+        tracks.iter_mut().for_each(|track| *track = standing(track, 2));
+        assert_eq!(doubts(&camera(), &tracks[..]), Doubts::default());
     }
 }

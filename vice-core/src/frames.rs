@@ -30,7 +30,7 @@ use std::ops::Mul;
 
 mod batch;
 
-pub(crate) use batch::Motion;
+pub(crate) use batch::{Motion, Varying, numbers_of};
 
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 

@@ -5,8 +5,10 @@
 //! it are what the streams are scored against.
 
 mod builder;
+mod list;
 
 pub use builder::LabelSetBuilder;
+pub use list::{Iter, Marks, ObservationList};
 
 use crate::camera::Pixel;
 use crate::time::Stamp;
@@ -83,16 +85,18 @@ pub struct PointLabels {
     /// Its name.
     pub name: String,
     /// Its observations.
-    pub observations: Vec<Observation>,
+    pub observations: ObservationList,
 }
 
 /// A key frame and what follows until the next one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Segment<'a> {
+#[derive(Clone, Debug, PartialEq)]
+pub struct Segment {
     /// The key frame.
-    pub keyframe: &'a Observation,
-    /// Observations after it.
-    pub rest: &'a [Observation],
+    pub keyframe: Observation,
+    /// Place of the key frame among the point's observations.
+    pub at: usize,
+    /// Places of the observations after it.
+    pub rest: std::ops::Range<usize>,
 }
 
 /// All labels of one camera of one run.
@@ -222,20 +226,22 @@ impl Observation {
 
 impl PointLabels {
     /// The segments in time order. Observations before the first key frame belong to none: see [`PointLabels::before_first_keyframe`].
-    pub fn segments(&self) -> impl Iterator<Item = Segment<'_>> {
-        let starts: Vec<usize> =
-            self.observations.iter().enumerate().filter(|(_, o)| o.keyframe).map(|(i, _)| i).collect();
-        let ends: Vec<usize> = starts.iter().skip(1).copied().chain([self.observations.len()]).collect();
-        starts.into_iter().zip(ends).map(|(start, end)| Segment {
-            keyframe: &self.observations[start],
-            rest: &self.observations[start + 1..end],
+    pub fn segments(&self) -> impl Iterator<Item = Segment> + '_ {
+        let marks = self.observations.marks();
+        let next = move |from: usize| marks[from..].iter().position(|m| m.keyframe()).map(|i| from + i);
+        let mut start = next(0);
+        std::iter::from_fn(move || {
+            let at = start?;
+            start = next(at + 1);
+            let rest = at + 1..start.unwrap_or(marks.len());
+            Some(Segment { keyframe: self.observations.get(at)?, at, rest })
         })
     }
 
-    /// Observations that no key frame precedes: there is nothing to carry along.
-    pub fn before_first_keyframe(&self) -> &[Observation] {
-        let n = self.observations.iter().position(|o| o.keyframe).unwrap_or(self.observations.len());
-        &self.observations[..n]
+    /// Number of observations that no key frame precedes: there is nothing to carry along.
+    pub fn before_first_keyframe(&self) -> usize {
+        let marks = self.observations.marks();
+        marks.iter().position(|m| m.keyframe()).unwrap_or(marks.len())
     }
 }
 
@@ -320,7 +326,7 @@ mod tests {
         ];
         let set = LabelSet::from_rows(rows).unwrap();
         let point = &set.points()[0];
-        assert_eq!(point.before_first_keyframe().len(), 1);
+        assert_eq!(point.before_first_keyframe(), 1);
         let segments: Vec<(i64, usize)> =
             point.segments().map(|s| (s.keyframe.stamp.as_nanos(), s.rest.len())).collect();
         assert_eq!(segments, [(1, 1), (3, 1)]);

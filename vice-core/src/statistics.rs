@@ -65,6 +65,72 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     })
 }
 
+/// A number whose order its leading bits tell, where it is not negative.
+pub(crate) trait Leading: Copy + Into<f64> {
+    /// The sixteen first bits of a number that is not negative.
+    fn leading(self) -> usize;
+}
+
+impl Leading for f32 {
+    #[inline]
+    fn leading(self) -> usize {
+        (self.to_bits() >> 16) as usize
+    }
+}
+
+impl Leading for f64 {
+    #[inline]
+    fn leading(self) -> usize {
+        (self.to_bits() >> 48) as usize
+    }
+}
+
+/// How many leading bits tell apart.
+const LEADING: usize = 1 << 16;
+
+/// The values at some ranks, ascending from 0, of the numbers in several slices that are wanted: in two passes and without a
+/// copy of them all. Numbers must not be negative; ranks ascend and are below their number.
+pub(crate) fn at_ranks<T: Leading>(parts: &[&[T]], wanted: impl Fn(&T) -> bool, ranks: &[u64]) -> Vec<f64> {
+    let mut counts = vec![0_u64; LEADING];
+    let all = || parts.iter().flat_map(|part| part.iter()).filter(|v| wanted(v));
+    for part in parts {
+        part.iter().filter(|v| wanted(v)).for_each(|v| counts[v.leading()] += 1);
+    }
+    let mut found = Vec::new();
+    // The numbers that share their leading bits, which were gathered last.
+    let (mut of, mut alike): (usize, Vec<f64>) = (LEADING, Vec::new());
+    for rank in ranks {
+        let (mut bucket, mut before) = (0, 0);
+        while bucket + 1 < LEADING && before + counts[bucket] <= *rank {
+            before += counts[bucket];
+            bucket += 1;
+        }
+        if bucket != of {
+            of = bucket;
+            alike = all().filter(|v| v.leading() == bucket).map(|v| (*v).into()).collect();
+        }
+        let at = usize::try_from(rank - before).unwrap_or(usize::MAX);
+        if at < alike.len() {
+            found.push(*alike.select_nth_unstable_by(at, f64::total_cmp).1);
+        }
+    }
+    found
+}
+
+/// [`median`] of the numbers in several slices that are wanted, none of which may be negative.
+pub(crate) fn median_in_parts<T: Leading>(parts: &[&[T]], wanted: impl Fn(&T) -> bool) -> Option<f64> {
+    let count = parts.iter().map(|part| part.iter().filter(|v| wanted(v)).count() as u64).sum::<u64>();
+    let middle = count / 2;
+    match (count, count.is_multiple_of(2)) {
+        (0, _) => None,
+        (_, false) => at_ranks(parts, wanted, &[middle]).first().copied(),
+        (_, true) => match at_ranks(parts, wanted, &[middle - 1, middle])[..] {
+            [lower, upper] => Some(f64::midpoint(lower, upper)),
+            _ => None,
+        },
+    }
+}
+
 /// The value in the middle, the upper one of the middle two: one of the values itself. `None` of nothing. In O(n);
 /// changes the order.
 pub fn middle<T: Copy>(values: &mut [T], compare: impl FnMut(&T, &T) -> Ordering) -> Option<T> {
@@ -113,6 +179,21 @@ mod tests {
             prop_assert_eq!(median.is_some(), quantile.is_some());
             prop_assert!((median.unwrap_or(0.0) - quantile.unwrap_or(0.0)).abs() < 1e-9);
             prop_assert_eq!(middle(&mut values.clone(), f64::total_cmp), sorted.get(sorted.len() / 2).copied());
+        }
+
+        #[test]
+        fn in_parts_it_is_the_same(values in prop::collection::vec(prop::sample::select(vec![0.0, 1e-300, 0.5, 0.50001, 1.0, 7.25, 1e9]), 0..40), cut in 0_usize..40) {
+            let cut = cut.min(values.len());
+            let parts = [&values[..cut], &values[cut..]];
+            prop_assert_eq!(median_in_parts(&parts, |_| true), median(&mut values.clone()));
+            let above: Vec<f64> = values.iter().copied().filter(|v| *v > 0.0).collect();
+            prop_assert_eq!(median_in_parts(&parts, |v| *v > 0.0), median(&mut above.clone()));
+            let sorted = sorted(values.clone());
+            let ranks: Vec<u64> = (0..values.len() as u64).collect();
+            prop_assert_eq!(at_ranks(&parts, |_| true, &ranks), sorted);
+            let floats: Vec<f32> = values.iter().map(|v| *v as f32).collect();
+            let mut wide: Vec<f64> = floats.iter().map(|v| f64::from(*v)).collect();
+            prop_assert_eq!(median_in_parts(&[&floats], |_| true), median(&mut wide));
         }
     }
 }

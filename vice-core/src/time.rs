@@ -50,16 +50,19 @@ impl Stamp {
     pub const MAX: Self = Self(i64::MAX);
 
     /// A stamp from nanoseconds since the epoch.
+    #[inline]
     pub const fn from_nanos(nanos: i64) -> Self {
         Self(nanos)
     }
 
     /// Nanoseconds since the epoch.
+    #[inline]
     pub const fn as_nanos(self) -> i64 {
         self.0
     }
 
     /// Seconds since the epoch, for display and plots only: a double cannot hold a nanosecond of today.
+    #[inline]
     pub fn as_secs_f64(self) -> f64 {
         self.0 as f64 / NANOS_PER_SECOND as f64
     }
@@ -107,6 +110,7 @@ impl Stamp {
     }
 
     /// The span from `earlier` to `self`, held at the ends of the range.
+    #[inline]
     pub fn since(self, earlier: Self) -> Span {
         Span(self.0.saturating_sub(earlier.0))
     }
@@ -124,6 +128,7 @@ impl Span {
     pub const MAX: Self = Self(i64::MAX);
 
     /// A span from nanoseconds.
+    #[inline]
     pub const fn from_nanos(nanos: i64) -> Self {
         Self(nanos)
     }
@@ -134,6 +139,7 @@ impl Span {
     }
 
     /// Nanoseconds.
+    #[inline]
     pub const fn as_nanos(self) -> i64 {
         self.0
     }
@@ -160,6 +166,7 @@ impl Span {
     }
 
     /// Seconds as a double.
+    #[inline]
     pub fn as_secs_f64(self) -> f64 {
         self.0 as f64 / NANOS_PER_SECOND as f64
     }

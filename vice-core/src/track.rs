@@ -5,10 +5,12 @@
 //! is the projection of `(world_from_body(t) body_from_camera(t))⁻¹ p_world`. Only the motion between the two frames
 //! enters, so that the stream's own world frame does not matter.
 
+use std::ops::Range;
+
 use nalgebra::Point3;
 
-use crate::camera::{Camera, Pixel, ProjectError, Track, UnprojectError, with_lens};
-use crate::frames::{self, Motion, Rigid, WorldFromCamera};
+use crate::camera::{Camera, Pixel, ProjectError, Track, TrackAlong, UnprojectError, with_lens};
+use crate::frames::{self, Motion, Rigid, WorldFromCamera, numbers_of};
 use crate::lanes::{Element, run};
 
 /// The scene point of a pixel: `z (x, y, 1)` in the camera frame, metres; `z_m` is along the optical axis.
@@ -54,6 +56,72 @@ pub fn track_batch<T: Element>(
     let now_from_keyframe = Motion::new(&now_from_keyframe);
     with_lens!(camera, bound => {
         run("track_batch", Track { bound, now_from_keyframe }, [z_m], uv_px, Some(valid))
+    })
+}
+
+/// Where a camera was over time, in structure-of-arrays form: what [`track_along`] carries a point through.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CameraPath {
+    /// The world in the camera: i, j, k, w of the unit quaternion, then the translation, metres; NaN where it is not known.
+    columns: [Vec<f64>; 7],
+}
+
+impl CameraPath {
+    /// The poses of a camera in order; `None` where one is not known.
+    pub fn new(cameras: impl IntoIterator<Item = Option<WorldFromCamera>>) -> Self {
+        let mut path = Self::default();
+        for camera in cameras {
+            let numbers = camera.map_or([f64::NAN; 7], |camera| numbers_of(&camera.inverse()));
+            path.columns.iter_mut().zip(numbers).for_each(|(column, number)| column.push(number));
+        }
+        path
+    }
+
+    /// How many poses.
+    pub fn len(&self) -> usize {
+        self.columns[0].len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The poses at some places.
+    pub(crate) fn some(&self, places: impl Iterator<Item = usize> + Clone) -> Self {
+        Self {
+            columns: self
+                .columns
+                .each_ref()
+                .map(|column| places.clone().map(|place| column[place]).collect()),
+        }
+    }
+
+    /// Some of them, as numbers.
+    pub(crate) fn columns(&self, range: Range<usize>) -> [&[f64]; 7] {
+        self.columns.each_ref().map(|column| &column[range.clone()])
+    }
+}
+
+/// [`track`] of one point to many cameras, in structure-of-arrays form.
+///
+/// `point_camera_m` is in the camera frame of the key frame. The pixels at the poses `range` of the path are written to `uv_px`;
+/// where the point has none, or the pose is not known, `valid[i]` is false and the pixel NaN. Returns how many are valid.
+///
+/// # Panics
+/// If the slices and the range differ in length, or the range ends behind the path.
+pub fn track_along(
+    camera: &Camera,
+    at_keyframe: &WorldFromCamera,
+    point_camera_m: &Point3<f64>,
+    (path, range): (&CameraPath, Range<usize>),
+    uv_px: [&mut [f64]; 2],
+    valid: &mut [bool],
+) -> usize {
+    let (at_keyframe, point_m) = (Motion::new(at_keyframe), (*point_camera_m).into());
+    with_lens!(camera, bound => {
+        let kernel = TrackAlong { bound, at_keyframe, point_m };
+        run("track_along", kernel, path.columns(range), uv_px, Some(valid))
     })
 }
 
@@ -114,6 +182,31 @@ mod tests {
                 prop_assert_eq!(valid[i], single.is_some());
                 if let Some(px) = single {
                     prop_assert_eq!(px, Pixel::new(u[i], v[i]));
+                }
+            }
+        }
+
+        #[test]
+        fn along_a_path_it_is_the_single_point(
+            k in any_pose(0.3), path in prop::collection::vec(prop::option::of(any_pose(0.6)), 1..40), z in 0.3..8.0_f64,
+        ) {
+            for (name, c) in crate::camera::lenses() {
+                let p = Point3::new(0.2 * z, -0.1 * z, z);
+                let n = path.len();
+                let (mut u, mut v, mut valid) = (vec![1.0; n + 1], vec![1.0; n + 1], vec![true; n + 1]);
+                let all = CameraPath::new(std::iter::once(None).chain(path.iter().copied()));
+                let count = track_along(&c, &k, &p, (&all, 1..n + 1), [&mut u[1..], &mut v[1..]], &mut valid[1..]);
+                prop_assert_eq!(count, valid[1..].iter().filter(|v| **v).count());
+                for (i, now) in path.iter().enumerate() {
+                    let single = now.and_then(|now| track(&c, &k, &now, &p).ok());
+                    prop_assert_eq!(valid[i + 1], single.is_some(), "{}", name);
+                    match single {
+                        Some(px) => {
+                            let (a, b) = ([u[i + 1], v[i + 1]], [px.u, px.v]);
+                            prop_assert_eq!(a.map(f64::to_bits), b.map(f64::to_bits), "{}", name);
+                        }
+                        None => prop_assert!(u[i + 1].is_nan() && v[i + 1].is_nan()),
+                    }
                 }
             }
         }

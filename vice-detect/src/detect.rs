@@ -106,7 +106,7 @@ pub fn additions(there: &LabelSet, found: &LabelSet) -> Vec<LabelRow> {
         .iter()
         .flat_map(|p| p.observations.iter().map(|o| (p.name.as_str(), o.stamp)))
         .collect();
-    let all = found.points().iter().flat_map(|p| p.observations.iter().map(move |o| (p.name.as_str(), *o)));
+    let all = found.points().iter().flat_map(|p| p.observations.iter().map(move |o| (p.name.as_str(), o)));
     all.filter(|(point, o)| !taken.contains(&(*point, o.stamp)))
         .map(|(point, observation)| LabelRow { point: point.to_string(), observation })
         .collect()

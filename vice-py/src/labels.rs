@@ -129,7 +129,7 @@ impl Labels {
 
     /// The labels as a Table.
     fn table(&self) -> Answer<Table> {
-        let rows: Vec<(&str, &Observation)> = self
+        let rows: Vec<(&str, Observation)> = self
             .core
             .points()
             .iter()
@@ -161,7 +161,7 @@ impl Labels {
         // Not whether they stood in the same lines of a file.
         let rows = |labels: &LabelSet| -> Vec<(String, Observation)> {
             let all = labels.points().iter();
-            all.flat_map(|p| p.observations.iter().map(|o| (p.name.clone(), Observation { line: 0, ..*o })))
+            all.flat_map(|p| p.observations.iter().map(|o| (p.name.clone(), Observation { line: 0, ..o })))
                 .collect()
         };
         other.cast::<Self>().is_ok_and(|other| rows(&other.get().core) == rows(&self.core))

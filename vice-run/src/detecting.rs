@@ -76,7 +76,7 @@ fn added(there: LabelSet, new: &LabelSet) -> RunResult<LabelSet> {
     let rows = there
         .points()
         .iter()
-        .flat_map(|p| p.observations.iter().map(|o| LabelRow { point: p.name.clone(), observation: *o }));
+        .flat_map(|p| p.observations.iter().map(|o| LabelRow { point: p.name.clone(), observation: o }));
     let mut labels = LabelSet::from_rows(rows.chain(more))
         .map_err(|e| RunError::usage("add", "the labels do not fit together").because(e))?;
     labels.dataset = there.dataset.or_else(|| new.dataset.clone());

@@ -182,14 +182,14 @@ mod tests {
         let mut compared = 0;
         for labels in [synthetic.floor_labels().unwrap(), synthetic.scene_labels().unwrap()] {
             for point in labels.points() {
-                assert!(point.before_first_keyframe().is_empty());
+                assert_eq!(point.before_first_keyframe(), 0);
                 for segment in point.segments() {
                     let key = world_from_camera(segment.keyframe.stamp);
                     let ray = camera.unproject(segment.keyframe.px).unwrap();
                     let eye = Point3::from(key.translation());
                     let z_m = synthetic.scene().cast(&eye, &key.rotate(&ray)).unwrap().distance;
                     let point_world = key.transform_point(&Point3::from(ray * z_m));
-                    for later in segment.rest {
+                    for later in point.observations.some(segment.rest) {
                         let pose = world_from_camera(later.stamp);
                         let px = camera.project(&pose.inverse().transform_point(&point_world)).unwrap();
                         assert!(px.distance_px(later.px) < 1e-9, "{px:?} {later:?}");

@@ -58,7 +58,7 @@ impl Document {
     /// A document of labels as a file has them.
     pub fn from_labels(labels: &LabelSet) -> Self {
         let points = labels.points().iter().map(|p| {
-            let observations = p.observations.iter().map(|o| (o.stamp, Observation { line: 0, ..*o }));
+            let observations = p.observations.iter().map(|o| (o.stamp, Observation { line: 0, ..o }));
             (p.name.clone(), observations.collect())
         });
         Self { dataset: labels.dataset.clone(), camera: labels.camera.clone(), points: points.collect() }

@@ -29,7 +29,9 @@ use nalgebra::{Point3, Vector3};
 use crate::lanes::Number;
 use seed::Seed;
 
-pub(crate) use batch::{Bound, Pinhole, Track, with_lens};
+#[cfg(test)]
+pub(crate) use batch::tests::lenses;
+pub(crate) use batch::{Bound, Pinhole, Track, TrackAlong, with_lens};
 pub use equidistant::Equidistant;
 pub use radtan::Radtan;
 pub use rational::Rational;

@@ -1,10 +1,15 @@
 //! Which key frames' depths are doubtful: where another source says another depth, and where none answers, where the
 //! point's error grows as that of a wrong depth does.
 
+use nalgebra::Point3;
+
+use super::DepthTable;
 use super::score::Scorer;
-use super::{DepthTable, pixel_key};
+use super::select::{SelectedPoint, SelectedSegment};
+use crate::camera::Pixel;
 use crate::depth::DepthSource;
-use crate::depth_doubt::{Doubts, LiftedTrack, doubts};
+use crate::depth_doubt::{Doubts, LiftedTrack, LiftedTracks, doubts};
+use crate::frames::WorldFromCamera;
 use crate::result::{DepthDoubt, DepthDoubtReason, PointName};
 use crate::suspicion::Suspicion;
 use crate::track::lift;
@@ -28,54 +33,116 @@ pub(super) fn depth_doubts(
     others: &[OtherDepths<'_>],
 ) -> (Vec<DepthDoubt>, Option<(f64, usize, usize)>) {
     let mut found = Vec::new();
-    let (mut tracks, mut alone) = (Vec::new(), Vec::new());
-    let segments =
-        scorer.evaluation.selection.points.iter().flat_map(|p| p.segments.iter().map(move |s| (p, s)));
+    let mut lifted = Lifted { scorer, tracks: Vec::new() };
+    let points = &scorer.evaluation.selection.points;
+    let segments = points.iter().enumerate().flat_map(|(p, of)| (0..of.segments.len()).map(move |s| (p, s)));
     for (place, (point, segment)) in segments.enumerate() {
-        let label = segment.keyframe.observation;
-        let key = (segment.keyframe.frame, pixel_key(label.px));
-        let Some(Ok(depth)) = scorer.depths.get(&key) else { continue };
-        let doubt = |reason, other_z_m| DepthDoubt {
-            point: PointName(point.name.clone()),
-            timestamp_ns: label.stamp,
-            reason,
-            depth_z_m: depth.z_m,
-            other_z_m,
-            other: None,
-            error_px: None,
-            error_then_px: None,
-        };
-        let answers: Vec<(&str, f64)> =
-            others.iter().filter_map(|o| Some((o.source.name(), o.depths.get(&key)?.ok()?.z_m))).collect();
+        let of = &points[point].segments[segment];
+        let Some(Ok(depth)) = scorer.depths.get(point, segment) else { continue };
+        let answers =
+            others.iter().filter_map(|o| Some((o.source.name(), o.depths.get(point, segment)?.ok()?.z_m)));
         let apart = |z_m: f64| (z_m - depth.z_m).abs() > SAME_DEPTH.0 * depth.z_m.max(z_m) + SAME_DEPTH.1;
-        if let Some((other, z_m)) = answers.iter().find(|(_, z_m)| apart(*z_m)) {
-            let other = Some((*other).to_string());
-            found.push((place, DepthDoubt { other, ..doubt(DepthDoubtReason::SourcesDisagree, *z_m) }));
+        if let Some((other, z_m)) = answers.clone().find(|(_, z_m)| apart(*z_m)) {
+            let doubt = doubt(&points[point], of, depth.z_m, DepthDoubtReason::SourcesDisagree, z_m);
+            found.push((place, DepthDoubt { other: Some(other.to_string()), ..doubt }));
         }
-        let Ok(point_camera_m) = lift(scorer.evaluation.camera, label.px, depth.z_m) else { continue };
-        let Ok(at_keyframe) = scorer.world_from_camera(segment.keyframe.frame) else { continue };
-        let every = segment.samples.len().div_ceil(MOST_VIEWS).max(1);
-        let views = segment.samples.iter().step_by(every).filter_map(|s| {
-            let now = scorer.world_from_camera(s.frame).ok()?;
-            Some((now.inverse() * at_keyframe, s.observation.px))
+        let label_px = points[point].px(of.keyframe);
+        let Ok(point_camera_m) = lift(scorer.evaluation.camera, label_px, depth.z_m) else { continue };
+        let Ok(at_keyframe) = scorer.placed[of.place] else { continue };
+        let alone = answers.count() == 0;
+        lifted.tracks.push(Track {
+            place,
+            point,
+            segment,
+            z_m: depth.z_m,
+            alone,
+            point_camera_m,
+            at_keyframe,
         });
-        tracks.push(LiftedTrack { point_camera_m, views: views.collect() });
-        alone.push((place, answers.is_empty(), doubt(DepthDoubtReason::DepthDoubtful, depth.z_m)));
     }
-    let Doubts { points, common } = doubts(scorer.evaluation.camera, &tracks);
-    for (i, better) in points {
-        let (place, true, doubt) = &alone[i] else { continue };
+    let Doubts { points: doubted, common } = doubts(scorer.evaluation.camera, &lifted);
+    for (i, better) in doubted {
+        let Track { place, point, segment, z_m, alone, .. } = lifted.tracks[i];
+        if !alone {
+            continue;
+        }
+        let of = &points[point].segments[segment];
         let doubt = DepthDoubt {
-            other_z_m: better.factor * doubt.depth_z_m,
             error_px: Some(better.error_px),
             error_then_px: Some(better.error_then_px),
-            ..doubt.clone()
+            ..doubt(&points[point], of, z_m, DepthDoubtReason::DepthDoubtful, better.factor * z_m)
         };
-        found.push((*place, doubt));
+        found.push((place, doubt));
     }
     found.sort_by_key(|(place, _)| *place);
-    let any_alone = alone.iter().any(|(_, alone, _)| *alone);
+    let any_alone = lifted.tracks.iter().any(|track| track.alone);
     (found.into_iter().map(|(_, doubt)| doubt).collect(), common.filter(|_| any_alone))
+}
+
+fn doubt(
+    point: &SelectedPoint<'_>,
+    segment: &SelectedSegment,
+    depth_z_m: f64,
+    reason: DepthDoubtReason,
+    other_z_m: f64,
+) -> DepthDoubt {
+    DepthDoubt {
+        point: PointName(point.name.clone()),
+        timestamp_ns: point.stamp(segment.keyframe),
+        reason,
+        depth_z_m,
+        other_z_m,
+        other: None,
+        error_px: None,
+        error_then_px: None,
+    }
+}
+
+/// A key point that is lifted.
+struct Track {
+    /// Among all segments.
+    place: usize,
+    point: usize,
+    segment: usize,
+    z_m: f64,
+    /// No other source says a depth.
+    alone: bool,
+    point_camera_m: Point3<f64>,
+    at_keyframe: WorldFromCamera,
+}
+
+/// The key points with their views, which are gathered where they are asked for: those of all would fill the memory.
+struct Lifted<'a> {
+    scorer: &'a Scorer<'a>,
+    tracks: Vec<Track>,
+}
+
+impl Lifted<'_> {
+    /// Places and labels of the views of a key point.
+    fn views(&self, track: &Track) -> impl Iterator<Item = (usize, Pixel)> + '_ {
+        let point = &self.scorer.evaluation.selection.points[track.point];
+        let segment = &point.segments[track.segment];
+        let every = segment.count.div_ceil(MOST_VIEWS).max(1);
+        let posed = |(_, place): &(usize, usize)| self.scorer.placed[*place].is_ok();
+        let labels = point.samples(segment).step_by(every).filter(posed);
+        labels.map(|(label, place)| (place, point.px(label)))
+    }
+}
+
+impl LiftedTracks for Lifted<'_> {
+    fn count(&self) -> usize {
+        self.tracks.len()
+    }
+
+    fn has_views(&self, track: usize, views: usize) -> bool {
+        self.views(&self.tracks[track]).take(views).count() == views
+    }
+
+    fn get(&self, track: usize) -> LiftedTrack {
+        let track = &self.tracks[track];
+        let views: Vec<(usize, Pixel)> = self.views(track).collect();
+        LiftedTrack::along(track.point_camera_m, track.at_keyframe, &self.scorer.path, &views)
+    }
 }
 
 /// What is to be said of them. `source` is the depth source they are about.

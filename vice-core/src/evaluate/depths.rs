@@ -1,24 +1,34 @@
 //! Depths at the key frames, asked of each source once: for all streams together, or for each by its own place.
 
-use std::collections::BTreeMap;
-
 use crate::parallel::*;
 
 use super::streams::PosesAtFrames;
-use super::{EvaluateError, Evaluation, position};
+use super::{EvaluateError, Evaluation};
 use crate::camera::Pixel;
 use crate::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
 use crate::error::{DataResult, one_line};
 use crate::frames::BodyFromCamera;
 use crate::suspicion::Suspicion;
 
-/// Depths of the pixels at the key frames of one source, by frame and pixel bits.
-pub(super) type DepthTable = BTreeMap<(usize, PixelKey), Result<DepthSample, DepthMiss>>;
+/// Depths at the key frames of one source.
+pub(super) struct DepthTable {
+    /// By point and segment; `None` where it was not asked.
+    by_segment: Vec<Vec<Option<Depth>>>,
+}
+
+type Depth = Result<DepthSample, DepthMiss>;
+
+impl DepthTable {
+    /// Of a point's segment; `None` where it was not asked.
+    pub(super) fn get(&self, point: usize, segment: usize) -> Option<Depth> {
+        *self.by_segment.get(point)?.get(segment)?
+    }
+}
 
 /// A pixel as a key: two labels at the same place are one question.
 type PixelKey = (u64, u64);
 
-pub(super) fn pixel_key(px: Pixel) -> PixelKey {
+fn pixel_key(px: Pixel) -> PixelKey {
     (px.u.to_bits(), px.v.to_bits())
 }
 
@@ -67,34 +77,52 @@ pub(super) fn keyframe_depths(
     cameras: &[Option<BodyFromCamera>],
     anchor: &PosesAtFrames,
 ) -> Result<DepthTable, EvaluateError> {
-    let mut pixels: BTreeMap<usize, BTreeMap<PixelKey, Pixel>> = BTreeMap::new();
-    for segment in evaluation.selection.points.iter().flat_map(|p| &p.segments) {
-        let px = segment.keyframe.observation.px;
-        pixels.entry(segment.keyframe.frame).or_default().insert(pixel_key(px), px);
-    }
-    let asked: Vec<(usize, BTreeMap<PixelKey, Pixel>)> = pixels.into_iter().collect();
-    let answers: Vec<DataResult<Vec<_>>> = asked
+    let points = &evaluation.selection.points;
+    let key = |point: usize, segment: usize| {
+        let (of, segment_of) = (&points[point], &points[point].segments[segment]);
+        (segment_of.frame, pixel_key(of.px(segment_of.keyframe)), point, segment)
+    };
+    let mut keys: Vec<(usize, PixelKey, usize, usize)> = points
+        .iter()
+        .enumerate()
+        .flat_map(|(point, of)| (0..of.segments.len()).map(move |segment| (point, segment)))
+        .map(|(point, segment)| key(point, segment))
+        .collect();
+    keys.sort_unstable();
+    let asked: Vec<&[(usize, PixelKey, usize, usize)]> = keys.chunk_by(|a, b| a.0 == b.0).collect();
+    let answers: Vec<DataResult<Vec<(usize, usize, Depth)>>> = asked
         .par_iter()
-        .map(|(frame, pixels)| {
-            let at = position(&evaluation.selection.frames, *frame);
+        .map(|keys| {
+            let (frame, _, point, segment) = keys[0];
+            let at = points[point].segments[segment].place;
             let Some(body_from_camera) = cameras[at] else { return Ok(vec![]) };
-            let stamp = evaluation.frames[*frame];
+            let stamp = evaluation.frames[frame];
             let keyframe = Keyframe {
                 stamp,
-                frame: *frame,
+                frame,
                 camera: evaluation.camera,
                 body_from_camera,
                 world_from_camera: anchor[at].ok().map(|pose| pose * body_from_camera),
                 floor: evaluation.rig.floor(stamp)?,
             };
-            let list: Vec<Pixel> = pixels.values().copied().collect();
+            // Two labels at the same place are one question.
+            let alike: Vec<_> = keys.chunk_by(|a, b| a.1 == b.1).collect();
+            let px = |some: &&[(usize, PixelKey, usize, usize)]| {
+                let (_, _, point, segment) = some[0];
+                points[point].px(points[point].segments[segment].keyframe)
+            };
+            let list: Vec<Pixel> = alike.iter().map(px).collect();
             let depths = source.depths(&keyframe, &list)?;
-            Ok(pixels.keys().zip(depths).map(|(key, depth)| ((*frame, *key), depth)).collect())
+            let each = alike.into_iter().zip(depths);
+            Ok(each.flat_map(|(some, depth)| some.iter().map(move |(_, _, p, s)| (*p, *s, depth))).collect())
         })
         .collect();
-    let mut table = DepthTable::new();
+    let mut by_segment: Vec<Vec<Option<Depth>>> =
+        points.iter().map(|p| vec![None; p.segments.len()]).collect();
     for answer in answers {
-        table.extend(answer?);
+        for (point, segment, depth) in answer? {
+            by_segment[point][segment] = Some(depth);
+        }
     }
-    Ok(table)
+    Ok(DepthTable { by_segment })
 }

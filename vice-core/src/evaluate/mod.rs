@@ -9,12 +9,16 @@
 //!
 //! No image is decoded on the way.
 
+mod carry;
+mod columns;
 mod curves;
 mod depth_doubts;
 mod depths;
 mod input;
+mod kept;
 mod path_doubts;
 mod rig;
+mod runs;
 mod score;
 mod select;
 mod since;
@@ -23,6 +27,7 @@ mod spread;
 mod streams;
 #[cfg(feature = "serde")]
 pub(crate) mod trial;
+mod windows;
 
 pub use input::{DEFAULT_MAX_GAP, Evaluation, EvaluationBuilder};
 pub use rig::{DatasetRig, FixedRig, Rig};
@@ -30,9 +35,10 @@ pub use select::{Observations, SelectedKeyframe, Selection, Window};
 pub use streams::Stream;
 
 use depth_doubts::{OtherDepths, depth_doubts};
-use depths::{DepthTable, SourceDepths, pixel_key};
+use depths::{DepthTable, SourceDepths};
 use score::Scorer;
 use streams::PosesAtFrames;
+use windows::Windows;
 
 use crate::error::{DataError, DataResult};
 use crate::frames::BodyFromCamera;
@@ -174,6 +180,7 @@ fn run(
         .map(|s| s.poses_at(evaluation.frames, &selection.frames, evaluation.max_gap))
         .collect();
 
+    let stamps: Vec<Stamp> = selection.frames.iter().map(|frame| evaluation.frames[*frame]).collect();
     // How far the camera moved is the reference's word, where there is one: an estimate may have another scale.
     let reference = evaluation.streams.iter().position(|s| s.role == Role::Reference);
     let path_m = reference.map(|stream| spread::path_m(&poses[stream], &cameras));
@@ -211,15 +218,16 @@ fn run(
                 Some(sink) => Some(&mut |samples| sink(&stream.name, source.name(), samples)),
                 None => None,
             };
+            let moved_m = path_m.as_ref().map_or_else(|| spread::path_m(poses, &cameras), Clone::clone);
+            let windows = Windows { stamps: &stamps, moved_m: &moved_m };
             let scorer = Scorer {
                 keep_samples: evaluation.keep_samples || to_sink.is_some(),
-                carries: true,
+                windows: Some(&windows),
                 ..Scorer::new(evaluation, &cameras, poses, known[place].of(index))
             };
             let scored = score::score(&scorer, to_sink).map_err(EvaluateError::Samples)?;
             let rmse_px = subset_rmse_px(&scored.errors, &sizes);
-            let moved_m = path_m.as_ref().map_or_else(|| spread::path_m(poses, &cameras), Clone::clone);
-            let spread = spread::spread(evaluation, &scored, &moved_m);
+            let spread = spread::spread(&scorer, &scored, &windows);
             let samples = scored.errors.iter().map(|e| e.count).sum();
             let about = format!("{}, {} depth", stream.name, source.name());
             suspicions.extend(spread::suspicions(&about, &spread, samples));
@@ -327,11 +335,6 @@ fn extrinsics(evaluation: &Evaluation<'_>) -> DataResult<Vec<Option<BodyFromCame
         }
         None => Ok(found),
     }
-}
-
-/// Position of a frame among the selected ones, which hold every frame that a segment names.
-fn position(selected: &[usize], frame: usize) -> usize {
-    selected.partition_point(|f| *f < frame)
 }
 
 fn skip(point: &PointName, stamp: Stamp, reason: SkipReason) -> Skip {

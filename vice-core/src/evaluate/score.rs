@@ -3,15 +3,19 @@
 use crate::parallel::*;
 use nalgebra::Point3;
 
+use super::carry::Start;
+use super::columns::{Scratch, median_residual};
+use super::runs::index;
 use super::select::{SelectedPoint, SelectedSegment};
 use super::streams::PosesAtFrames;
-use super::{DepthTable, Evaluation, SkipReason, pixel_key, position, skip};
+use super::windows::Windows;
+use super::{DepthTable, Evaluation, SkipReason, skip};
 use crate::camera::Pixel;
-use crate::frames::{self, BodyFromCamera, Rigid, WorldFromBody, WorldFromCamera};
-use crate::metrics::held::{Carried, CarriedSegment};
+use crate::frames::{BodyFromCamera, WorldFromBody, WorldFromCamera};
+use crate::metrics::by_age::SegmentErrors;
 use crate::metrics::pixel::SquaredErrors;
 use crate::result::{KeyframePart, PointName, Sample, Skip};
-use crate::track::lift;
+use crate::track::{CameraPath, lift, track};
 use crate::trajectory::NoPose;
 
 /// What was scored of all points, in their order and in time.
@@ -21,17 +25,48 @@ pub(super) struct Scored {
     pub(super) samples: Vec<Sample>,
     pub(super) skipped: Vec<Skip>,
     pub(super) keyframes: Vec<KeyframePart>,
-    /// What was carried of each segment with a sample, where that is asked for.
-    pub(super) carried: Vec<CarriedSegment>,
+    /// The segments with a sample, where they are asked for.
+    pub(super) segments: Vec<ScoredSegment>,
+    /// By point: the numbers of its samples.
+    pub(super) columns: Vec<Columns>,
+}
+
+/// What is kept of each sample of a point: the rest is carried once more where it is asked for.
+#[derive(Default)]
+pub(super) struct Columns {
+    /// By how much it is off from those around it, px.
+    pub(super) jumps_px: Vec<f32>,
+    /// The squared error, px².
+    pub(super) squares_px2: Vec<f64>,
+}
+
+/// A segment with samples.
+#[derive(Clone, Debug)]
+pub(super) struct ScoredSegment {
+    /// Of which point, and which of its segments.
+    pub(super) point: usize,
+    pub(super) segment: usize,
+    /// Place of the key frame.
+    pub(super) keyframe: u32,
+    /// Its part of the point's columns.
+    pub(super) first: usize,
+    pub(super) count: usize,
+    /// Which of the segment's labels the samples are, where it is not all of them.
+    pub(super) which: Option<Box<[u32]>>,
+    /// Length of the median of the first residuals, px.
+    pub(super) start_px: f64,
+    /// Sums with nothing set aside.
+    pub(super) errors: SegmentErrors,
 }
 
 #[derive(Default)]
 struct ScoredPoint {
-    carried: Vec<CarriedSegment>,
     errors: SquaredErrors,
     samples: Vec<Sample>,
     skipped: Vec<Skip>,
     keyframes: Vec<KeyframePart>,
+    segments: Vec<ScoredSegment>,
+    columns: Columns,
 }
 
 /// Points that are scored before their samples are handed on: enough for all threads, few enough for the memory.
@@ -58,7 +93,8 @@ pub(super) fn score(scorer: &Scorer<'_>, mut sink: Option<TakePoint<'_>>) -> std
             }
             all.skipped.extend(point.skipped);
             all.keyframes.extend(point.keyframes);
-            all.carried.extend(point.carried);
+            all.segments.extend(point.segments);
+            all.columns.push(point.columns);
         }
     }
     Ok(all)
@@ -69,11 +105,13 @@ pub(super) struct Scorer<'a> {
     pub(super) evaluation: &'a Evaluation<'a>,
     /// Where the camera is at each selected frame.
     pub(super) placed: Vec<Result<WorldFromCamera, SkipReason>>,
+    /// The same for many at once.
+    pub(super) path: CameraPath,
     pub(super) depths: &'a DepthTable,
     /// Whether samples are listed, or handed on.
     pub(super) keep_samples: bool,
-    /// Whether residuals are kept by segment, in a few bytes each.
-    pub(super) carries: bool,
+    /// Parts of segments by age and motion, where residuals are kept by segment.
+    pub(super) windows: Option<&'a Windows<'a>>,
 }
 
 impl<'a> Scorer<'a> {
@@ -88,17 +126,20 @@ impl<'a> Scorer<'a> {
             let world_from_body = pose.map_err(SkipReason::of_frame)?;
             Ok(world_from_body * camera.ok_or(SkipReason::NoExtrinsics)?)
         };
-        let placed = poses.iter().zip(cameras).map(place).collect();
-        Self { evaluation, placed, depths, keep_samples: false, carries: false }
+        let placed: Vec<_> = poses.iter().zip(cameras).map(place).collect();
+        let path = CameraPath::new(placed.iter().map(|p: &Result<_, _>| p.ok()));
+        Self { evaluation, placed, path, depths, keep_samples: false, windows: None }
     }
 
     fn point(&self, place: usize, point: &SelectedPoint<'_>) -> ScoredPoint {
         let name = PointName(point.name.clone());
         let mut scored = ScoredPoint::default();
+        let mut scratch = Scratch::default();
         scored.skipped.extend(point.skips.iter().map(|(stamp, reason)| skip(&name, *stamp, *reason)));
-        for segment in &point.segments {
-            if let Err(reason) = self.segment(segment, (place, &name), &mut scored) {
-                let stamps = segment.samples.iter().map(|s| s.observation.stamp);
+        for segment in 0..point.segments.len() {
+            let done = self.segment(point, (place, segment, &name), &mut scored, &mut scratch);
+            if let Err(reason) = done {
+                let stamps = point.samples(&point.segments[segment]).map(|(label, _)| point.stamp(label));
                 scored.skipped.extend(stamps.map(|stamp| skip(&name, stamp, reason)));
             }
         }
@@ -106,104 +147,175 @@ impl<'a> Scorer<'a> {
         scored
     }
 
-    /// Scores a segment; the error is what its key frame lacks, and so why all of it is skipped.
-    fn segment(
-        &self,
-        segment: &SelectedSegment<'_>,
-        (place, name): (usize, &PointName),
-        scored: &mut ScoredPoint,
-    ) -> Result<(), SkipReason> {
-        let camera = self.evaluation.camera;
-        let keyframe = segment.keyframe;
-        let at_keyframe = self.world_from_camera(keyframe.frame).map_err(|reason| match reason {
+    /// The point of a segment in the camera of its key frame, metres, and where that camera is; what is lacking is why all
+    /// of it is skipped.
+    fn lifted(&self, (place, number): (usize, usize)) -> Result<Lifted, SkipReason> {
+        let point = &self.evaluation.selection.points[place];
+        let segment = &point.segments[number];
+        let px = point.px(segment.keyframe);
+        let at_keyframe = self.placed[segment.place].map_err(|reason| match reason {
             SkipReason::NoExtrinsics => reason,
             _ => SkipReason::KeyframeGap,
         })?;
-        let depth = self.depths.get(&(keyframe.frame, pixel_key(keyframe.observation.px)));
+        let depth = self.depths.get(place, number);
         let depth = depth.ok_or(SkipReason::NoExtrinsics)?.map_err(SkipReason::NoDepth)?;
         let point_camera_m =
-            lift(camera, keyframe.observation.px, depth.z_m).map_err(|_| SkipReason::OutsideModel)?;
+            lift(self.evaluation.camera, px, depth.z_m).map_err(|_| SkipReason::OutsideModel)?;
+        Ok(Lifted { at_keyframe, point_camera_m, z_m: depth.z_m, on_edge: depth.on_edge })
+    }
+
+    /// Scores a segment; the error is what its key frame lacks, and so why all of it is skipped.
+    fn segment(
+        &self,
+        point: &SelectedPoint<'_>,
+        (place, number, name): (usize, usize, &PointName),
+        scored: &mut ScoredPoint,
+        scratch: &mut Scratch,
+    ) -> Result<(), SkipReason> {
+        let segment = &point.segments[number];
+        let lifted = self.lifted((place, number))?;
         scored.keyframes.push(KeyframePart {
             point: name.clone(),
-            timestamp_ns: keyframe.observation.stamp,
-            label_px: Some(keyframe.observation.px),
-            depth_z_m: depth.z_m,
-            point_world_m: Some(at_keyframe.transform_point(&point_camera_m).coords.into()),
-            on_edge: depth.on_edge,
+            timestamp_ns: point.stamp(segment.keyframe),
+            label_px: Some(point.px(segment.keyframe)),
+            depth_z_m: lifted.z_m,
+            point_world_m: Some(lifted.at_keyframe.transform_point(&lifted.point_camera_m).coords.into()),
+            on_edge: lifted.on_edge,
         });
-        let mut at = self.at(keyframe.frame);
-        let mut carried = CarriedSegment { point: place, keyframe: frame_u32(at), samples: Vec::new() };
-        for sample in &segment.samples {
-            let label = sample.observation;
-            at = self.at_or_after(at, sample.frame);
-            let point_m = self.placed[at].map(|now| {
-                let now_from_keyframe: Rigid<frames::Camera, frames::Camera> = now.inverse() * at_keyframe;
-                now_from_keyframe.transform_point(&point_camera_m)
-            });
-            let tracked = point_m.and_then(|point_m| {
-                let tracked_px = camera.project(&point_m).map_err(SkipReason::of_projection)?;
-                Ok((point_m, tracked_px))
-            });
-            match tracked {
-                Ok((point_m, tracked_px)) => {
-                    let error_px = tracked_px.distance_px(label.px);
-                    scored.errors.add(error_px);
-                    if self.carries {
-                        carried.samples.push(self.carried(label.px, at, &point_m, tracked_px));
-                    }
-                    if self.keep_samples {
-                        scored.samples.push(Sample {
-                            point: name.clone(),
-                            timestamp_ns: label.stamp,
-                            label_px: label.px,
-                            tracked_px,
-                            error_px,
-                        });
-                    }
+        self.carry(point, segment, &lifted, scratch);
+        let Scratch { carried, .. } = &*scratch;
+        let mut which = None;
+        if !carried.valid.iter().all(|valid| *valid) {
+            let scored_ones = (0..carried.valid.len()).filter(|i| carried.valid[*i]);
+            which = Some(scored_ones.map(index).collect::<Box<[u32]>>());
+            for ((label, now), valid) in point.samples(segment).zip(&carried.valid) {
+                if !valid {
+                    let reason = self.no_pixel(&lifted, now);
+                    scored.skipped.push(skip(name, point.stamp(label), reason));
                 }
-                Err(reason) => scored.skipped.push(skip(name, label.stamp, reason)),
             }
         }
-        if !carried.samples.is_empty() {
-            scored.carried.push(carried);
+        if self.keep_samples {
+            for (i, (label, _)) in point.samples(segment).enumerate().filter(|(i, _)| carried.valid[*i]) {
+                let label_px = point.px(label);
+                let tracked_px = Pixel::new(carried.tracked_px[0][i], carried.tracked_px[1][i]);
+                scored.samples.push(Sample {
+                    point: name.clone(),
+                    timestamp_ns: point.stamp(label),
+                    label_px,
+                    tracked_px,
+                    error_px: tracked_px.distance_px(label_px),
+                });
+            }
         }
+        scratch.compare(which.as_deref(), &mut scored.errors);
+        let count = scratch.places.len();
+        let Some(windows) = self.windows.filter(|_| count > 0) else { return Ok(()) };
+        let first = scored.columns.squares_px2.len();
+        scratch.keep(&mut scored.columns);
+        let start = median_residual(&scratch.residuals, 0..count.min(3));
+        scored.segments.push(ScoredSegment {
+            point: place,
+            segment: number,
+            keyframe: index(segment.place),
+            first,
+            count,
+            which,
+            start_px: (start[0] * start[0] + start[1] * start[1]).sqrt(),
+            errors: scratch.errors(windows, segment.place, &[]),
+        });
         Ok(())
     }
 
-    /// The residual of a sample, in pixels, as an angle, and at its depth. `point_m` is the carried point in the camera
-    /// frame of the label.
-    fn carried(&self, label: Pixel, at: usize, point_m: &Point3<f64>, tracked_px: Pixel) -> Carried {
-        let mut carried = Carried {
-            frame: frame_u32(at),
-            residual_px: [tracked_px.u - label.u, tracked_px.v - label.v],
-            angle_rad: f32::NAN,
-            offset_m: f32::NAN,
+    /// Carries the point of a segment to all its labels.
+    fn carry(
+        &self,
+        point: &SelectedPoint<'_>,
+        segment: &SelectedSegment,
+        lifted: &Lifted,
+        scratch: &mut Scratch,
+    ) {
+        let Lifted { at_keyframe, point_camera_m, .. } = lifted;
+        let start = Start { camera: self.evaluation.camera, at_keyframe, point_camera_m: *point_camera_m };
+        scratch.carry(&start, &self.path, point, segment);
+    }
+
+    /// Why the point has no pixel at a place.
+    fn no_pixel(&self, lifted: &Lifted, place: usize) -> SkipReason {
+        let now = match &self.placed[place] {
+            Ok(now) => now,
+            Err(reason) => return *reason,
         };
-        if let Ok(ray) = self.evaluation.camera.unproject(label) {
-            let point_m = point_m.coords;
-            carried.angle_rad = point_m.cross(&ray).norm().atan2(point_m.dot(&ray)) as f32;
-            carried.offset_m = (point_m - point_m.z * ray).norm() as f32;
+        match track(self.evaluation.camera, &lifted.at_keyframe, now, &lifted.point_camera_m) {
+            Err(error) => SkipReason::of_projection(error),
+            Ok(_) => SkipReason::OutsideModel,
         }
-        carried
     }
 
-    /// Place of a frame among the selected ones.
-    fn at(&self, frame: usize) -> usize {
-        position(&self.evaluation.selection.frames, frame)
+    /// The errors of a segment without some of its samples.
+    pub(super) fn errors_without(
+        &self,
+        segment: &ScoredSegment,
+        windows: &Windows<'_>,
+        without: &[usize],
+    ) -> SegmentErrors {
+        let point = &self.evaluation.selection.points[segment.point];
+        let selected = &point.segments[segment.segment];
+        let Ok(lifted) = self.lifted((segment.point, segment.segment)) else {
+            return SegmentErrors::default();
+        };
+        let mut scratch = Scratch::default();
+        self.carry(point, selected, &lifted, &mut scratch);
+        scratch.compare(segment.which.as_deref(), &mut SquaredErrors::default());
+        scratch.errors(windows, selected.place, without)
     }
 
-    /// The same from the place of a frame that is most often the one before.
-    fn at_or_after(&self, before: usize, frame: usize) -> usize {
-        let next = before + 1;
-        if self.evaluation.selection.frames.get(next) == Some(&frame) { next } else { self.at(frame) }
+    /// Where some samples of a segment are carried minus where their labels are, px.
+    pub(super) fn residuals(
+        &self,
+        segment: &ScoredSegment,
+        samples: std::ops::Range<usize>,
+    ) -> Vec<[f64; 2]> {
+        let point = &self.evaluation.selection.points[segment.point];
+        let selected = &point.segments[segment.segment];
+        let Ok(Lifted { at_keyframe, point_camera_m, .. }) = self.lifted((segment.point, segment.segment))
+        else {
+            return Vec::new();
+        };
+        let residual = |(label, place): (usize, usize)| {
+            let now = self.placed[place].as_ref().ok()?;
+            let tracked = track(self.evaluation.camera, &at_keyframe, now, &point_camera_m).ok()?;
+            let label = point.px(label);
+            Some([tracked.u - label.u, tracked.v - label.v])
+        };
+        let labels: Vec<(usize, usize)> = match &segment.which {
+            None => point.samples(selected).skip(samples.start).take(samples.len()).collect(),
+            Some(which) => {
+                let all: Vec<(usize, usize)> = point.samples(selected).collect();
+                which[samples].iter().map(|i| all[*i as usize]).collect()
+            }
+        };
+        labels.into_iter().filter_map(residual).collect()
     }
 
-    pub(super) fn world_from_camera(&self, frame: usize) -> Result<WorldFromCamera, SkipReason> {
-        self.placed[self.at(frame)]
+    /// Places of the samples of a segment.
+    pub(super) fn places(&self, segment: &ScoredSegment) -> Vec<u32> {
+        let point = &self.evaluation.selection.points[segment.point];
+        let all = point.samples(&point.segments[segment.segment]).map(|(_, place)| index(place));
+        match &segment.which {
+            None => all.collect(),
+            Some(which) => {
+                let all: Vec<u32> = all.collect();
+                which.iter().map(|i| all[*i as usize]).collect()
+            }
+        }
     }
 }
 
-/// A place as residuals keep it.
-fn frame_u32(at: usize) -> u32 {
-    u32::try_from(at).unwrap_or(u32::MAX)
+/// A point of a key frame.
+struct Lifted {
+    at_keyframe: WorldFromCamera,
+    point_camera_m: Point3<f64>,
+    z_m: f64,
+    on_edge: bool,
 }

@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
+use super::kept::{FrameFinder, KeptFrames};
+use super::runs::{self, Run, index};
 use super::{EvaluateError, SkipReason};
-use crate::camera::Camera;
-use crate::label::{LabelSet, Observation, ObservationSource};
+use crate::camera::{Camera, Pixel};
+use crate::label::{LabelSet, Marks, Observation, ObservationList, ObservationSource, PointLabels};
+use crate::parallel::*;
 use crate::time::{Span, Stamp};
 use crate::time_unit::mixed_up;
 
@@ -49,12 +52,13 @@ impl Observations {
     }
 
     /// Why a label does not count, as a sample and as a key frame; `None` where it does.
-    fn leaves_out(self, observation: &Observation) -> Option<(SkipReason, SkipReason)> {
+    #[inline]
+    fn leaves_out(self, marks: Marks) -> Option<(SkipReason, SkipReason)> {
         match self {
-            Self::Certain if observation.uncertain => {
+            Self::Certain if marks.uncertain() => {
                 Some((SkipReason::Uncertain, SkipReason::KeyframeUncertain))
             }
-            Self::Manual if observation.source != ObservationSource::Manual => {
+            Self::Manual if marks.source() != ObservationSource::Manual => {
                 Some((SkipReason::NotManual, SkipReason::KeyframeNotManual))
             }
             _ => None,
@@ -86,26 +90,49 @@ impl Window {
     }
 }
 
-/// A label and the index of its frame.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Matched<'a> {
-    pub(super) observation: &'a Observation,
-    pub(super) frame: usize,
-}
-
 /// A key frame and the labels that are scored against it.
-#[derive(Debug)]
-pub(super) struct SelectedSegment<'a> {
-    pub(super) keyframe: Matched<'a>,
-    pub(super) samples: Vec<Matched<'a>>,
+#[derive(Clone, Debug)]
+pub(super) struct SelectedSegment {
+    /// Its label at the key frame, by its place among those of the point.
+    pub(super) keyframe: usize,
+    /// The key frame, among the camera's frames.
+    pub(super) frame: usize,
+    /// The same among the selected frames.
+    pub(super) place: usize,
+    /// Its part of the point's runs.
+    pub(super) runs: std::ops::Range<usize>,
+    /// How many labels are scored.
+    pub(super) count: usize,
 }
 
 /// A point with what is scored of it, and what is known not to be.
 #[derive(Debug)]
 pub(super) struct SelectedPoint<'a> {
     pub(super) name: Arc<str>,
-    pub(super) segments: Vec<SelectedSegment<'a>>,
+    pub(super) labels: &'a ObservationList,
+    pub(super) segments: Vec<SelectedSegment>,
+    /// The labels that are scored; frames are places among the selected ones.
+    pub(super) runs: Vec<Run>,
     pub(super) skips: Vec<(Stamp, SkipReason)>,
+}
+
+impl SelectedPoint<'_> {
+    /// A label's pixel.
+    #[inline]
+    pub(super) fn px(&self, label: usize) -> Pixel {
+        Pixel::new(self.labels.u_px()[label], self.labels.v_px()[label])
+    }
+
+    /// A label's stamp.
+    #[inline]
+    pub(super) fn stamp(&self, label: usize) -> Stamp {
+        self.labels.stamps()[label]
+    }
+
+    /// Labels of a segment that are scored, and their places among the selected frames.
+    pub(super) fn samples(&self, segment: &SelectedSegment) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.runs[segment.runs.clone()].iter().flat_map(|run| run.pairs())
+    }
 }
 
 /// The frames and labels that take part.
@@ -119,21 +146,24 @@ pub struct Selection<'a> {
 }
 
 /// A key frame that takes part, with the labels that are scored against it. Frames are indices.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct SelectedKeyframe<'s> {
     /// Name of the point.
     pub point: &'s str,
     /// Its label at the key frame.
-    pub keyframe: &'s Observation,
+    pub keyframe: Observation,
     /// The key frame.
     pub frame: usize,
-    samples: &'s [Matched<'s>],
+    of: &'s SelectedPoint<'s>,
+    segment: &'s SelectedSegment,
+    frames: &'s [usize],
 }
 
 impl<'s> SelectedKeyframe<'s> {
     /// The labels that are scored, and their frames.
-    pub fn samples(&self) -> impl Iterator<Item = (&'s Observation, usize)> + use<'s> {
-        self.samples.iter().map(|s| (s.observation, s.frame))
+    pub fn samples(&self) -> impl Iterator<Item = (Observation, usize)> + use<'s> {
+        let (of, frames) = (self.of, self.frames);
+        of.samples(self.segment).filter_map(|(label, place)| Some((of.labels.get(label)?, frames[place])))
     }
 }
 
@@ -164,73 +194,18 @@ impl<'a> Selection<'a> {
         }
         check_inside(labels, camera)?;
         let kept = KeptFrames::new(frames, window);
-        let mut selection = Self { points: Vec::new(), frames: Vec::new(), in_window: Vec::new() };
-        let mut used = vec![false; frames.len()];
-        let mut finder = FrameFinder { frames, next: 0 };
-        let mut at_a_frame = false;
-        for point in labels.points() {
-            let mut selected =
-                SelectedPoint { name: point.name.as_str().into(), segments: vec![], skips: vec![] };
-            for observation in point.before_first_keyframe() {
-                at_a_frame |= finder.find(observation.stamp).is_some();
-                if kept.covers(observation.stamp) {
-                    selected.skips.push((observation.stamp, SkipReason::BeforeFirstKeyframe));
-                }
-            }
-            for segment in point.segments() {
-                let keyframe = finder.find(segment.keyframe.stamp);
-                at_a_frame |= keyframe.is_some();
-                let keyframe_left_out =
-                    window.observations.leaves_out(segment.keyframe).map(|(_, reason)| reason);
-                let mut samples = Vec::new();
-                for observation in segment.rest {
-                    let frame = finder.find(observation.stamp);
-                    at_a_frame |= frame.is_some();
-                    if !kept.covers(observation.stamp) {
-                        continue;
-                    }
-                    let Some(frame) = frame else {
-                        selected.skips.push((observation.stamp, SkipReason::NoFrame));
-                        continue;
-                    };
-                    if !kept.has(frame) {
-                        continue;
-                    }
-                    let left_out = window.observations.leaves_out(observation).map(|(reason, _)| reason);
-                    let reason = left_out
-                        .or_else(|| keyframe.is_none().then_some(SkipReason::KeyframeNoFrame))
-                        .or_else(|| observation.occluded.then_some(SkipReason::Occluded))
-                        .or(keyframe_left_out);
-                    match reason {
-                        Some(reason) => selected.skips.push((observation.stamp, reason)),
-                        None => samples.push(Matched { observation, frame }),
-                    }
-                }
-                let Some(frame) = keyframe else {
-                    if kept.covers(segment.keyframe.stamp) {
-                        selected.skips.push((segment.keyframe.stamp, SkipReason::NoFrame));
-                    }
-                    continue;
-                };
-                if samples.is_empty() && !(kept.covers(segment.keyframe.stamp) && keyframe_left_out.is_none())
-                {
-                    continue;
-                }
-                used[frame] = true;
-                samples.iter().for_each(|s| used[s.frame] = true);
-                let keyframe = Matched { observation: segment.keyframe, frame };
-                selected.segments.push(SelectedSegment { keyframe, samples });
-            }
-            selection.points.push(selected);
-        }
+        let chosen = |point: &'a PointLabels| choose(point, frames, &kept, window.observations);
+        let (mut points, at_frames): (Vec<_>, Vec<bool>) =
+            labels.points().par_iter().map(chosen).collect::<Vec<_>>().into_iter().unzip();
+        let at_a_frame = at_frames.contains(&true);
         if !at_a_frame {
             return Err(no_label_at_a_frame(labels, (*first, *last)));
         }
-        selection.frames = (0..frames.len()).filter(|f| used[*f]).collect();
-        if selection.frames.is_empty() {
-            let mut keyframes =
-                labels.points().iter().flat_map(|p| &p.observations).filter(|o| o.keyframe).peekable();
-            if keyframes.peek().is_some() && !keyframes.any(|o| window.observations.leaves_out(o).is_none()) {
+        let used = used_frames(&points, frames.len());
+        if used.is_empty() {
+            let marks =
+                || labels.points().iter().flat_map(|p| p.observations.marks()).filter(|m| m.keyframe());
+            if marks().next().is_some() && !marks().any(|m| window.observations.leaves_out(*m).is_none()) {
                 return Err(match window.observations {
                     Observations::Manual => EvaluateError::NoManualKeyframe,
                     _ => EvaluateError::NoCertainKeyframe,
@@ -243,13 +218,14 @@ impl<'a> Selection<'a> {
                 EvaluateError::NoKeyframe
             });
         }
-        selection.in_window = selection.frames.iter().copied().filter(|f| kept.covers(frames[*f])).collect();
-        Ok(selection)
+        let in_window = used.iter().copied().filter(|f| kept.covers(frames[*f])).collect();
+        place(&mut points, &used, frames.len());
+        Ok(Self { points, frames: used, in_window })
     }
 
     /// The earliest key frame that takes part.
     pub fn first_keyframe(&self) -> Option<Stamp> {
-        self.points.iter().flat_map(|p| &p.segments).map(|s| s.keyframe.observation.stamp).min()
+        self.points.iter().flat_map(|p| p.segments.iter().map(|s| p.stamp(s.keyframe))).min()
     }
 
     /// The first and last frame that takes part.
@@ -260,11 +236,15 @@ impl<'a> Selection<'a> {
     /// The key frames that take part, by point and in time.
     pub fn keyframes(&self) -> impl Iterator<Item = SelectedKeyframe<'_>> {
         self.points.iter().flat_map(|p| {
-            p.segments.iter().map(|s| SelectedKeyframe {
-                point: &p.name,
-                keyframe: s.keyframe.observation,
-                frame: s.keyframe.frame,
-                samples: &s.samples,
+            p.segments.iter().filter_map(|segment| {
+                Some(SelectedKeyframe {
+                    point: &p.name,
+                    keyframe: p.labels.get(segment.keyframe)?,
+                    frame: segment.frame,
+                    of: p,
+                    segment,
+                    frames: &self.frames,
+                })
             })
         })
     }
@@ -275,9 +255,116 @@ impl<'a> Selection<'a> {
     }
 }
 
+/// What takes part of a point; frames are the camera's. And whether any label is at a frame.
+fn choose<'a>(
+    point: &'a PointLabels,
+    frames: &[Stamp],
+    kept: &KeptFrames,
+    whose: Observations,
+) -> (SelectedPoint<'a>, bool) {
+    let labels = &point.observations;
+    let (stamps, marks) = (labels.stamps(), labels.marks());
+    let mut selected = SelectedPoint {
+        name: point.name.as_str().into(),
+        labels,
+        segments: vec![],
+        runs: vec![],
+        skips: vec![],
+    };
+    let mut finder = FrameFinder::new(frames);
+    let mut at_a_frame = false;
+    for stamp in &stamps[..point.before_first_keyframe()] {
+        at_a_frame |= finder.find(*stamp).is_some();
+        if kept.covers(*stamp) {
+            selected.skips.push((*stamp, SkipReason::BeforeFirstKeyframe));
+        }
+    }
+    for segment in point.segments() {
+        let keyframe = finder.find(segment.keyframe.stamp);
+        at_a_frame |= keyframe.is_some();
+        let keyframe_left_out = whose.leaves_out(marks[segment.at]).map(|(_, reason)| reason);
+        let first = selected.runs.len();
+        for label in segment.rest {
+            let (stamp, marks) = (stamps[label], marks[label]);
+            let frame = finder.find(stamp);
+            at_a_frame |= frame.is_some();
+            if !kept.covers(stamp) {
+                continue;
+            }
+            let Some(frame) = frame else {
+                selected.skips.push((stamp, SkipReason::NoFrame));
+                continue;
+            };
+            if !kept.has(frame) {
+                continue;
+            }
+            let left_out = whose.leaves_out(marks).map(|(reason, _)| reason);
+            let reason = left_out
+                .or_else(|| keyframe.is_none().then_some(SkipReason::KeyframeNoFrame))
+                .or_else(|| marks.occluded().then_some(SkipReason::Occluded))
+                .or(keyframe_left_out);
+            match reason {
+                Some(reason) => selected.skips.push((stamp, reason)),
+                None => runs::add(&mut selected.runs, first, label, frame),
+            }
+        }
+        let runs = first..selected.runs.len();
+        let Some(frame) = keyframe else {
+            if kept.covers(segment.keyframe.stamp) {
+                selected.skips.push((segment.keyframe.stamp, SkipReason::NoFrame));
+            }
+            continue;
+        };
+        if runs.is_empty() && !(kept.covers(segment.keyframe.stamp) && keyframe_left_out.is_none()) {
+            continue;
+        }
+        let count = selected.runs[runs.clone()].iter().map(|r| r.count as usize).sum();
+        selected.segments.push(SelectedSegment { keyframe: segment.at, frame, place: 0, runs, count });
+    }
+    (selected, at_a_frame)
+}
+
+/// Frames with a key frame or a label that takes part, ascending.
+fn used_frames(points: &[SelectedPoint<'_>], frames: usize) -> Vec<usize> {
+    let mut used = vec![false; frames];
+    for point in points {
+        for segment in &point.segments {
+            used[segment.frame] = true;
+        }
+        for run in &point.runs {
+            let from = run.frame as usize;
+            used[from..from + run.count as usize].fill(true);
+        }
+    }
+    (0..frames).filter(|f| used[*f]).collect()
+}
+
+/// Makes places among the selected frames of the camera's frames.
+fn place(points: &mut [SelectedPoint<'_>], selected: &[usize], frames: usize) {
+    let mut places = vec![0; frames];
+    for (place, frame) in selected.iter().enumerate() {
+        places[*frame] = index(place);
+    }
+    for point in points {
+        let mut placed: Vec<Run> = Vec::with_capacity(point.runs.len());
+        for segment in &mut point.segments {
+            segment.place = places[segment.frame] as usize;
+            let first = placed.len();
+            for run in &point.runs[segment.runs.clone()] {
+                let run = Run { frame: places[run.frame as usize], ..*run };
+                runs::add_run(&mut placed, first, run);
+            }
+            segment.runs = first..placed.len();
+        }
+        point.runs = placed;
+    }
+}
+
 fn check_inside(labels: &LabelSet, camera: &Camera) -> Result<(), EvaluateError> {
     for point in labels.points() {
-        if let Some(o) = point.observations.iter().find(|o| !camera.contains(o.px)) {
+        let (u, v) = (point.observations.u_px(), point.observations.v_px());
+        let outside = u.iter().zip(v).position(|(u, v)| !camera.contains(Pixel::new(*u, *v)));
+        if let Some(o) = outside.and_then(|i| point.observations.get(i)) {
             return Err(EvaluateError::LabelOutside {
                 point: point.name.clone(),
                 stamp: o.stamp,
@@ -293,108 +380,11 @@ fn check_inside(labels: &LabelSet, camera: &Camera) -> Result<(), EvaluateError>
 }
 
 fn no_label_at_a_frame(labels: &LabelSet, frames: (Stamp, Stamp)) -> EvaluateError {
-    let stamps = || labels.points().iter().flat_map(|p| &p.observations).map(|o| o.stamp);
+    let stamps = || labels.points().iter().flat_map(|p| p.observations.stamps()).copied();
     let labels = (stamps().min().unwrap_or_default(), stamps().max().unwrap_or_default());
     EvaluateError::NoLabelAtFrame {
         labels,
         frames,
         suspicion: mixed_up(("labels", labels), ("frames", frames)),
-    }
-}
-
-/// Finds frames by their exact stamp. Labels mostly go from one frame to the next, so that is looked at first.
-struct FrameFinder<'a> {
-    frames: &'a [Stamp],
-    next: usize,
-}
-
-impl FrameFinder<'_> {
-    fn find(&mut self, stamp: Stamp) -> Option<usize> {
-        let frame = match self.frames.get(self.next) {
-            Some(next) if *next == stamp => self.next,
-            _ => self.frames.binary_search(&stamp).ok()?,
-        };
-        self.next = frame + 1;
-        Some(frame)
-    }
-}
-
-/// The frames of the window.
-struct KeptFrames {
-    first: Stamp,
-    last: Stamp,
-    /// With a rate, the frames nearest to its ticks; without, all.
-    ticked: Option<Vec<bool>>,
-}
-
-impl KeptFrames {
-    fn new(frames: &[Stamp], window: &Window) -> Self {
-        let first = frames[0] + window.start;
-        let last = window.duration.map_or(Stamp::MAX, |d| first + d);
-        let ticked = window.fps.map(|fps| {
-            let period_ns = 1e9 / fps;
-            let end = last.min(frames[frames.len() - 1]);
-            let mut ticked = vec![false; frames.len()];
-            let mut next_frame = frames.partition_point(|s| *s < first);
-            // Ticks between two frames all choose one of the two, so that walking frames, not ticks, bounds the work.
-            while next_frame < frames.len() {
-                let before = next_frame.checked_sub(1).filter(|i| frames[*i] >= first);
-                let stamp = frames[next_frame];
-                let from_ns = before.map_or(0, |i| frames[i].since(first).as_nanos()) as f64;
-                let to_ns = stamp.since(first).as_nanos() as f64;
-                let middle = before.map_or(f64::NEG_INFINITY, |_| 0.5 * (from_ns + to_ns));
-                let limit_ns = end.since(first).as_nanos() as f64;
-                let first_tick = (from_ns / period_ns).ceil();
-                let last_tick = (to_ns.min(limit_ns) / period_ns).floor();
-                if first_tick <= last_tick {
-                    // A tick in the middle chooses the earlier frame.
-                    if let Some(before) = before.filter(|_| first_tick * period_ns <= middle) {
-                        ticked[before] = true;
-                    }
-                    if last_tick * period_ns > middle {
-                        ticked[next_frame] = true;
-                    }
-                }
-                next_frame += 1;
-            }
-            ticked
-        });
-        Self { first, last, ticked }
-    }
-
-    fn covers(&self, stamp: Stamp) -> bool {
-        stamp >= self.first && stamp <= self.last
-    }
-
-    fn has(&self, frame: usize) -> bool {
-        self.ticked.as_ref().is_none_or(|t| t[frame])
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn kept(millis: &[i64], fps: f64, duration_ms: Option<i64>) -> Vec<usize> {
-        let frames: Vec<Stamp> = millis.iter().map(|m| Stamp::from_nanos(m * 1_000_000)).collect();
-        let window =
-            Window { fps: Some(fps), duration: duration_ms.map(Span::from_millis), ..Window::default() };
-        let ticked = KeptFrames::new(&frames, &window).ticked.unwrap();
-        (0..frames.len()).filter(|i| ticked[*i]).collect()
-    }
-
-    #[test]
-    fn each_tick_keeps_its_nearest_frame() {
-        let twenty_hz: Vec<i64> = (0..21).map(|i| 1000 + 50 * i).collect();
-        assert_eq!(kept(&twenty_hz, 10.0, None), (0..21).step_by(2).collect::<Vec<_>>());
-        assert_eq!(kept(&twenty_hz, 10.0, Some(300)), [0, 2, 4, 6]);
-        // Ticks at 0, 100, 200 ...: 130 is nearest to 100, 180 to 200, and 500 to those from 340 on.
-        assert_eq!(kept(&[0, 60, 130, 180, 500], 10.0, None), [0, 2, 3, 4]);
-        assert_eq!(kept(&[0], 10.0, None), [0]);
-        let window = Window { start: Span::from_nanos(90), fps: None, ..Window::default() };
-        assert_eq!(window.frames(&[0, 100, 200].map(Stamp::from_nanos)), [1, 2]);
-        assert_eq!(Window::default().frames(&[]), [0_usize; 0]);
-        // Faster than the frames: all are kept.
-        assert_eq!(kept(&[0, 10, 20, 33], 1000.0, None), [0, 1, 2, 3]);
     }
 }

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use super::Evaluation;
 use super::streams::PosesAtFrames;
-use super::{Evaluation, position};
 use crate::frames::rotation_angle_rad;
 use crate::result::MotionError;
 
@@ -14,16 +14,19 @@ pub(super) fn since_keyframe(
     reference: &PosesAtFrames,
     estimate: &PosesAtFrames,
 ) -> Vec<MotionError> {
-    let segments = evaluation.selection.points.iter().flat_map(|p| &p.segments);
-    let pairs: BTreeSet<(usize, usize)> =
-        segments.flat_map(|s| s.samples.iter().map(|sample| (s.keyframe.frame, sample.frame))).collect();
+    let mut pairs: BTreeSet<(usize, usize)> = BTreeSet::new();
+    for point in &evaluation.selection.points {
+        for segment in &point.segments {
+            pairs.extend(point.samples(segment).map(|(_, place)| (segment.place, place)));
+        }
+    }
+    let stamp = |place: usize| evaluation.frames[evaluation.selection.frames[place]];
     let error = |(from, to): (usize, usize)| {
-        let at = |frame| position(&evaluation.selection.frames, frame);
-        let motion = |poses: &PosesAtFrames| Some(poses[at(from)].ok()?.inverse() * poses[at(to)].ok()?);
+        let motion = |poses: &PosesAtFrames| Some(poses[from].ok()?.inverse() * poses[to].ok()?);
         let (reference, estimate) = (motion(reference)?, motion(estimate)?);
         Some(MotionError {
-            keyframe_ns: evaluation.frames[from],
-            timestamp_ns: evaluation.frames[to],
+            keyframe_ns: stamp(from),
+            timestamp_ns: stamp(to),
             position_m: (estimate.translation() - reference.translation()).norm(),
             angle_rad: rotation_angle_rad(&(reference.rotation().inverse() * estimate.rotation())),
         })

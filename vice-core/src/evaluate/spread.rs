@@ -1,15 +1,17 @@
 //! The error of the labels that hold, with its interval, by age and by motion, for one stream and depth source.
 
-use super::Evaluation;
-use super::score::Scored;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use super::score::{Scored, ScoredSegment, Scorer};
+use super::windows::Windows;
 use crate::frames::BodyFromCamera;
-use crate::metrics::by_age::{AGES_S, Errors, MOTIONS_M, errors, errors_at};
-use crate::metrics::held::{Aside, CarriedSegment, set_aside};
+use crate::metrics::by_age::{Errors, SegmentErrors, Window, errors, errors_at};
+use crate::metrics::held::{Aside, Segments, set_aside};
 use crate::metrics::interval::{Estimated, FEWEST_SEGMENTS};
 use crate::result::{AsideReason, Figure, HeldPart, PointName, SetAside, WindowPart};
-use crate::statistics::median;
+use crate::statistics::{at_ranks, median_in_parts};
 use crate::suspicion::Suspicion;
-use crate::time::Stamp;
 
 use super::streams::PosesAtFrames;
 
@@ -46,12 +48,59 @@ pub(super) fn path_m(poses: &PosesAtFrames, cameras: &[Option<BodyFromCamera>]) 
     poses.iter().zip(cameras).map(step).collect()
 }
 
-/// All of it from what was scored. `moved_m` is by selected frame.
-pub(super) fn spread(evaluation: &Evaluation<'_>, scored: &Scored, moved_m: &[f64]) -> Spread {
-    let segments = &scored.carried;
-    let aside = set_aside(segments);
-    let stamp = |at: u32| evaluation.frames[evaluation.selection.frames[at as usize]];
-    let Some(all) = errors(segments, &aside, |_, _| true) else {
+/// What was scored, as it is asked which labels hold.
+struct Asked<'a> {
+    scorer: &'a Scorer<'a>,
+    scored: &'a Scored,
+}
+
+impl Asked<'_> {
+    fn one(&self, segment: usize) -> &ScoredSegment {
+        &self.scored.segments[segment]
+    }
+}
+
+impl Segments for Asked<'_> {
+    fn count(&self) -> usize {
+        self.scored.segments.len()
+    }
+
+    fn point(&self, segment: usize) -> usize {
+        self.one(segment).point
+    }
+
+    fn keyframe(&self, segment: usize) -> u32 {
+        self.one(segment).keyframe
+    }
+
+    fn frames(&self, segment: usize) -> Vec<u32> {
+        self.scorer.places(self.one(segment))
+    }
+
+    fn jumps_px(&self, segment: usize) -> &[f32] {
+        let ScoredSegment { point, first, count, .. } = self.one(segment);
+        &self.scored.columns[*point].jumps_px[*first..first + count]
+    }
+
+    fn start_px(&self, segment: usize) -> Option<f64> {
+        Some(self.one(segment).start_px)
+    }
+
+    fn residuals(&self, segment: usize, samples: Range<usize>) -> Vec<[f64; 2]> {
+        self.scorer.residuals(self.one(segment), samples)
+    }
+}
+
+/// All of it from what was scored.
+pub(super) fn spread(scorer: &Scorer<'_>, scored: &Scored, windows: &Windows<'_>) -> Spread {
+    let segments = &scored.segments;
+    let asked = Asked { scorer, scored };
+    let aside = set_aside(&asked);
+    let mended: BTreeMap<usize, SegmentErrors> =
+        aside.iter().map(|(i, aside)| (*i, without(scorer, &segments[*i], aside, windows))).collect();
+    let held: Vec<(usize, &SegmentErrors)> =
+        segments.iter().enumerate().map(|(i, s)| (s.point, mended.get(&i).unwrap_or(&s.errors))).collect();
+    let Some(all) = errors(&held) else {
         // Nothing holds, or nothing was scored.
         return Spread {
             held_rmse_px: None,
@@ -61,40 +110,56 @@ pub(super) fn spread(evaluation: &Evaluation<'_>, scored: &Scored, moved_m: &[f6
             by_distance: vec![],
         };
     };
-    let age_s = |from: u32, to: u32| stamp(to).since(stamp(from)).as_secs_f64();
-    let way_m = |from: u32, to: u32| moved_m[to as usize] - moved_m[from as usize];
-    let by_age = AGES_S.map(|at| {
-        let part = window(errors_at(segments, &aside, at, age_s), format!("{} s", 1.2 * at));
-        WindowPart { age_s: Some(at), ..part }
-    });
-    let by_distance = MOTIONS_M.map(|at| {
-        let part = window(errors_at(segments, &aside, at, way_m), format!("{} m of motion", 1.2 * at));
-        WindowPart { moved_m: Some(at), ..part }
-    });
-    let mut squares: Vec<f64> = segments
-        .iter()
-        .flat_map(|s| s.samples.iter().map(crate::metrics::held::Carried::square_px2))
-        .collect();
+    let (mut by_age, mut by_distance) = (Vec::new(), Vec::new());
+    for window in Window::all() {
+        let at = window.at();
+        let found = errors_at(&held, window);
+        match window {
+            Window::Age(_) => {
+                let part = self::window(found, format!("{} s", 1.2 * at));
+                by_age.push(WindowPart { age_s: Some(at), ..part });
+            }
+            Window::Motion(_) => {
+                let part = self::window(found, format!("{} m of motion", 1.2 * at));
+                by_distance.push(WindowPart { moved_m: Some(at), ..part });
+            }
+        }
+    }
+    let squares: Vec<&[f64]> = scored.columns.iter().map(|c| c.squares_px2.as_slice()).collect();
     let held = HeldPart {
         segments: all.px.segments as u64,
         points: all.px.points as u64,
         samples: all.px.samples,
-        median_px: median(&mut squares).map(f64::sqrt),
+        median_px: median_in_parts(&squares, |_| true).map(f64::sqrt),
         mrad: all.angle_rad.map(|e| figure(&e, MILLI)),
         mm: all.offset_m.map(|e| figure(&e, MILLI)),
         degrees_of_freedom: all.px.degrees_of_freedom,
         note: note(&all.px),
         heaviest_segment_share: heaviest_segment(segments),
-        heaviest_percent_share: heaviest_percent(&mut squares),
-        set_aside: list(evaluation, segments, &aside, stamp),
+        heaviest_percent_share: heaviest_percent(&squares),
+        set_aside: list(&asked, &aside, windows),
     };
     Spread {
         held_rmse_px: Some(all.px.rmse),
         interval_95: all.px.interval_95(),
         held: Some(held),
-        by_age: by_age.into(),
-        by_distance: by_distance.into(),
+        by_age,
+        by_distance,
     }
+}
+
+/// The errors of a segment without what is set aside of it.
+fn without(
+    scorer: &Scorer<'_>,
+    segment: &ScoredSegment,
+    aside: &Aside,
+    windows: &Windows<'_>,
+) -> SegmentErrors {
+    if aside.keyframe_px.is_some() {
+        return SegmentErrors::default();
+    }
+    let labels: Vec<usize> = aside.labels.iter().map(|(place, _)| *place).collect();
+    scorer.errors_without(segment, windows, &labels)
 }
 
 fn figure(found: &Estimated, unit: f64) -> Figure {
@@ -148,45 +213,50 @@ fn note(found: &Estimated) -> Option<String> {
 }
 
 /// Share of the squared error of the heaviest segment.
-fn heaviest_segment(segments: &[CarriedSegment]) -> f64 {
-    let sums = segments.iter().map(|s| s.samples.iter().map(|c| c.square_px2()).sum::<f64>());
+fn heaviest_segment(segments: &[ScoredSegment]) -> f64 {
+    let sums = segments.iter().map(|s| s.errors.squares_px2());
     let (all, most) = sums.fold((0.0, 0.0_f64), |(all, most), sum| (all + sum, most.max(sum)));
     if all > 0.0 { most / all } else { 0.0 }
 }
 
 /// Share of the squared error of the largest 1 % of the samples.
-fn heaviest_percent(squares: &mut [f64]) -> f64 {
-    let few = squares.len().div_ceil(100);
-    let all: f64 = squares.iter().sum();
+fn heaviest_percent(squares: &[&[f64]]) -> f64 {
+    let count: u64 = squares.iter().map(|part| part.len() as u64).sum();
+    let all: f64 = squares.iter().flat_map(|part| part.iter()).sum();
+    let few = count.div_ceil(100);
     if few == 0 || all <= 0.0 {
         return 0.0;
     }
-    let (_, _, _) = squares.select_nth_unstable_by(few - 1, |a, b| b.total_cmp(a));
-    squares[..few].iter().sum::<f64>() / all
+    let Some(least) = at_ranks(squares, |_| true, &[count - few]).first().copied() else { return 0.0 };
+    let (mut above, mut sum) = (0_u64, 0.0);
+    for square in squares.iter().flat_map(|part| part.iter()).filter(|v| **v > least) {
+        above += 1;
+        sum += square;
+    }
+    // Of those at the limit as many as are left.
+    (sum + (few - above.min(few)) as f64 * least) / all
 }
 
-fn list(
-    evaluation: &Evaluation<'_>,
-    segments: &[CarriedSegment],
-    aside: &[Aside],
-    stamp: impl Fn(u32) -> Stamp,
-) -> Vec<SetAside> {
+fn list(asked: &Asked<'_>, aside: &BTreeMap<usize, Aside>, windows: &Windows<'_>) -> Vec<SetAside> {
+    let stamp = |place: u32| windows.stamps[place as usize];
     let mut list = Vec::new();
-    for (segment, aside) in segments.iter().zip(aside) {
-        let point = || PointName(evaluation.selection.points[segment.point].name.clone());
+    for (number, aside) in aside {
+        let segment = asked.one(*number);
+        let point = || PointName(asked.scorer.evaluation.selection.points[segment.point].name.clone());
         if let Some(off_px) = aside.keyframe_px {
             list.push(SetAside {
                 point: point(),
                 timestamp_ns: stamp(segment.keyframe),
                 reason: AsideReason::KeyframeOff,
                 off_px,
-                samples: segment.samples.len() as u64,
+                samples: segment.count as u64,
             });
             continue;
         }
+        let places = asked.frames(*number);
         list.extend(aside.labels.iter().map(|(place, off_px)| SetAside {
             point: point(),
-            timestamp_ns: stamp(segment.samples[*place].frame),
+            timestamp_ns: stamp(places[*place]),
             reason: AsideReason::LabelJumps,
             off_px: *off_px,
             samples: 1,

@@ -254,7 +254,7 @@ fn labels_that_cannot_be_scored_are_counted() {
     let mut rows: Vec<LabelRow> = good
         .points()
         .iter()
-        .flat_map(|p| p.observations.iter().map(|o| LabelRow { point: p.name.clone(), observation: *o }))
+        .flat_map(|p| p.observations.iter().map(|o| LabelRow { point: p.name.clone(), observation: o }))
         .collect();
     rows[3].observation.stamp = rows[3].observation.stamp + Span::from_nanos(7);
     rows[5].observation.occluded = true;
@@ -275,7 +275,7 @@ fn what_cannot_be_evaluated_says_why() {
     let shifted = |span| {
         LabelSet::from_rows(labels.points().iter().flat_map(|p| {
             p.observations.iter().map(move |o| {
-                let mut observation = *o;
+                let mut observation = o;
                 observation.stamp = observation.stamp + span;
                 LabelRow { point: p.name.clone(), observation }
             })
@@ -364,8 +364,7 @@ proptest! {
 fn manual_labels_are_scored_without_a_word_of_a_machine() {
     let mut rows: Vec<LabelRow> = Vec::new();
     for point in labels(&flyer()).points() {
-        for (i, observation) in point.observations.iter().enumerate() {
-            let mut observation = *observation;
+        for (i, mut observation) in point.observations.iter().enumerate() {
             // Every other label is the tracker's; of point 3 also the second key frame.
             if i % 2 == 1 || (point.name == "3" && i == 20) {
                 observation.source = ObservationSource::Auto;

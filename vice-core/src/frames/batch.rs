@@ -29,6 +29,52 @@ impl Motion {
     }
 }
 
+/// A rigid transform whose numbers are those of many at once, or of one.
+#[derive(Clone, Copy)]
+pub(crate) struct Varying<N> {
+    ijk: [N; 3],
+    w: N,
+    translation_m: [N; 3],
+}
+
+impl<N: Number> Varying<N> {
+    /// Of the numbers that [`numbers_of`] gives.
+    #[inline(always)]
+    pub(crate) fn of([i, j, k, w, x, y, z]: [N; 7]) -> Self {
+        Self { ijk: [i, j, k], w, translation_m: [x, y, z] }
+    }
+
+    /// `self * motion`, in the order of operations of [`Rigid`]'s product.
+    #[inline(always)]
+    pub(crate) fn times(&self, motion: &Motion) -> Self {
+        let ([i, j, k], w) = (self.ijk, self.w);
+        let ([mi, mj, mk], mw) = (motion.ijk, motion.w);
+        Self {
+            ijk: [
+                w * mi + i * mw + j * mk - k * mj,
+                w * mj - i * mk + j * mw + k * mi,
+                w * mk + i * mj - j * mi + k * mw,
+            ],
+            w: w * mw - i * mi - j * mj - k * mk,
+            translation_m: self.apply(motion.translation_m),
+        }
+    }
+
+    /// [`Motion::apply`] to one point.
+    #[inline(always)]
+    pub(crate) fn apply(&self, [x, y, z]: [f64; 3]) -> [N; 3] {
+        let ([i, j, k], w, [tx, ty, tz]) = (self.ijk, self.w, self.translation_m);
+        let (a, b, c) = ((j * z - k * y) * 2.0, (k * x - i * z) * 2.0, (i * y - j * x) * 2.0);
+        [a * w + (j * c - k * b) + x + tx, b * w + (k * a - i * c) + y + ty, c * w + (i * b - j * a) + z + tz]
+    }
+}
+
+/// The numbers of a rigid transform: i, j, k, w of the unit quaternion, then the translation.
+pub(crate) fn numbers_of<D, S>(dst_from_src: &Rigid<D, S>) -> [f64; 7] {
+    let Motion { ijk: [i, j, k], w, translation_m: [x, y, z] } = Motion::new(dst_from_src);
+    [i, j, k, w, x, y, z]
+}
+
 #[derive(Clone, Copy)]
 struct Transform(Motion);
 

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::{LabelError, LabelSet, NaturalName, Observation, PointLabels};
+use super::{LabelError, LabelSet, NaturalName, Observation, ObservationList, PointLabels};
 
 /// Takes observations one by one.
 #[derive(Clone, Debug, Default)]
@@ -29,18 +29,38 @@ impl LabelSetBuilder {
         if let Some(confidence) = observation.provenance.confidence.filter(|c| !(0.0..=1.0).contains(c)) {
             return Err(LabelError::Confidence { point: point.to_string(), stamp, confidence, line });
         }
+        self.find(point).push(observation);
+        Ok(())
+    }
+
+    /// Adds observations of a point.
+    ///
+    /// # Errors
+    /// As [`LabelSetBuilder::push`], for the first that is none.
+    pub fn append(&mut self, point: &str, observations: ObservationList) -> Result<(), LabelError> {
+        let is_finite = |all: &[f64]| all.iter().all(|v| v.is_finite());
+        let plain = observations.says_nothing() && !point.is_empty();
+        if plain && is_finite(observations.u_px()) && is_finite(observations.v_px()) {
+            self.find(point).append(observations);
+            return Ok(());
+        }
+        observations.iter().try_for_each(|observation| self.push(point, observation))
+    }
+
+    /// The observations of a point so far.
+    fn find(&mut self, point: &str) -> &mut ObservationList {
         let is_at = |index: usize| self.points.get(index).is_some_and(|p| p.name == point);
         let near = [self.last, self.last + 1, 0].into_iter().find(|i| is_at(*i));
         self.last = match near.or_else(|| self.by_name.get(point).copied()) {
             Some(index) => index,
             None => {
                 self.by_name.insert(point.to_string(), self.points.len());
-                self.points.push(PointLabels { name: point.to_string(), observations: Vec::new() });
+                let observations = ObservationList::default();
+                self.points.push(PointLabels { name: point.to_string(), observations });
                 self.points.len() - 1
             }
         };
-        self.points[self.last].observations.push(observation);
-        Ok(())
+        &mut self.points[self.last].observations
     }
 
     /// The labels: points in natural order of their names (2 before 10), observations by stamp.
@@ -51,12 +71,11 @@ impl LabelSetBuilder {
         let mut points = self.points;
         points.sort_by_cached_key(|p| NaturalName::new(p.name.clone()));
         for point in &mut points {
-            if !point.observations.is_sorted_by_key(|o| (o.stamp, o.line)) {
-                point.observations.sort_by_key(|o| (o.stamp, o.line));
-            }
-            if let Some(pair) = point.observations.windows(2).find(|w| w[0].stamp == w[1].stamp) {
-                let (point, stamp, line) = (point.name.clone(), pair[1].stamp, pair[1].line);
-                return Err(LabelError::Duplicate { point, stamp, line });
+            point.observations.sort();
+            let stamps = point.observations.stamps();
+            if let Some(i) = stamps.windows(2).position(|w| w[0] == w[1]) {
+                let line = point.observations.get(i + 1).map_or(0, |o| o.line);
+                return Err(LabelError::Duplicate { point: point.name.clone(), stamp: stamps[i + 1], line });
             }
         }
         Ok(LabelSet { points, dataset: None, camera: None })

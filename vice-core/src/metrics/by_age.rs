@@ -4,7 +4,8 @@
 //! Age `a` is all held samples between 0.8 and 1.2 `a`. It is refused with fewer than five segments that reach 1.2 `a`: a
 //! window that is half filled gives too small a number.
 
-use super::held::{Aside, Carried, CarriedSegment};
+use std::ops::Range;
+
 use super::interval::{Estimated, FEWEST_SEGMENTS, SegmentSum};
 
 /// Ages that are told, seconds.
@@ -27,52 +28,173 @@ pub struct Errors {
     pub offset_m: Option<Estimated>,
 }
 
-/// The errors of the held samples that `takes` lets pass, given the segment and the sample; `None` where there are none.
-pub fn errors(
-    segments: &[CarriedSegment],
-    aside: &[Aside],
-    takes: impl Fn(&CarriedSegment, &Carried) -> bool,
-) -> Option<Errors> {
-    let sums = |square: fn(&Carried) -> f64| -> Vec<SegmentSum> {
-        let one = |(segment, aside): (&CarriedSegment, &Aside)| {
-            let mut sum = SegmentSum { point: segment.point, squares: 0.0, count: 0 };
-            for sample in aside.held(segment).filter(|s| takes(segment, s)) {
-                sum.squares += square(sample);
-                sum.count += 1;
+/// Held samples of a segment in time.
+#[derive(Clone, Copy, Debug)]
+pub struct Samples<'a> {
+    /// Squared errors, px².
+    pub squares_px2: &'a [f64],
+    /// Angles between the rays of carried point and label, radians; NaN where the label has no ray.
+    pub angle_rad: &'a [f32],
+    /// Distances at the depth of the carried point, metres; NaN where the label has no ray.
+    pub offset_m: &'a [f32],
+}
+
+/// Sums of squared errors.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Sums {
+    px2: f64,
+    rad2: f64,
+    m2: f64,
+    count: u64,
+}
+
+/// Sums of the squared errors of a segment: of all its held samples, and of those at each age and motion that is told.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SegmentErrors {
+    all: Sums,
+    /// By the number of the window, those that have samples.
+    windows: Vec<(u8, Sums)>,
+    /// Age and motion of the last sample.
+    last: [f64; 2],
+}
+
+impl Default for SegmentErrors {
+    /// Without samples.
+    fn default() -> Self {
+        Self { all: Sums::default(), windows: Vec::new(), last: [f64::NEG_INFINITY; 2] }
+    }
+}
+
+/// An age or a motion that is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Window {
+    /// One of [`AGES_S`].
+    Age(usize),
+    /// One of [`MOTIONS_M`].
+    Motion(usize),
+}
+
+impl Window {
+    /// All of them.
+    pub fn all() -> impl Iterator<Item = Self> {
+        (0..AGES_S.len()).map(Self::Age).chain((0..MOTIONS_M.len()).map(Self::Motion))
+    }
+
+    fn number(self) -> u8 {
+        match self {
+            Self::Age(i) => i as u8,
+            Self::Motion(i) => (AGES_S.len() + i) as u8,
+        }
+    }
+
+    /// Seconds or metres.
+    pub fn at(self) -> f64 {
+        match self {
+            Self::Age(i) => AGES_S[i],
+            Self::Motion(i) => MOTIONS_M[i],
+        }
+    }
+
+    const fn kind(self) -> usize {
+        match self {
+            Self::Age(_) => 0,
+            Self::Motion(_) => 1,
+        }
+    }
+}
+
+impl Samples<'_> {
+    fn sums(&self, range: Range<usize>) -> Sums {
+        let Self { squares_px2, angle_rad, offset_m } = self;
+        let mut sums = Sums { count: range.len() as u64, ..Sums::default() };
+        let samples = squares_px2[range.clone()].iter().zip(&angle_rad[range.clone()]).zip(&offset_m[range]);
+        for ((square, angle), offset) in samples {
+            sums.px2 += square;
+            sums.rad2 += f64::from(*angle).powi(2);
+            sums.m2 += f64::from(*offset).powi(2);
+        }
+        sums
+    }
+}
+
+impl SegmentErrors {
+    /// Of held samples; age (seconds) and motion (metres) since the key frame are by sample, and never fall.
+    pub fn of(samples: &Samples<'_>, age_s: impl Fn(usize) -> f64, motion_m: impl Fn(usize) -> f64) -> Self {
+        let count = samples.squares_px2.len();
+        let Some(last) = count.checked_sub(1) else { return Self::default() };
+        let mut windows = Vec::new();
+        for window in Window::all() {
+            let range = match window {
+                Window::Age(_) => around(window.at(), count, &age_s),
+                Window::Motion(_) => around(window.at(), count, &motion_m),
+            };
+            if !range.is_empty() {
+                windows.push((window.number(), samples.sums(range)));
             }
-            sum
-        };
-        segments.iter().zip(aside).map(one).collect()
+        }
+        Self { all: samples.sums(0..count), windows, last: [age_s(last), motion_m(last)] }
+    }
+
+    /// Sum of the squared errors of all held samples, px².
+    pub const fn squares_px2(&self) -> f64 {
+        self.all.px2
+    }
+}
+
+/// The samples in the window around `at`.
+#[inline]
+fn around(at: f64, count: usize, since: impl Fn(usize) -> f64) -> Range<usize> {
+    let (low, high) = (at * (WINDOW.0 - SLACK), at * (WINDOW.1 + SLACK));
+    if since(count - 1) < low {
+        return 0..0;
+    }
+    let first = |reached: &dyn Fn(f64) -> bool| {
+        let (mut from, mut to) = (0, count);
+        while from < to {
+            let middle = usize::midpoint(from, to);
+            if reached(since(middle)) { to = middle } else { from = middle + 1 }
+        }
+        from
+    };
+    let from = first(&|v| v >= low);
+    from..first(&|v| v > high).max(from)
+}
+
+/// The errors of some sums, by the point that they are of; `None` where there is no sample.
+fn errors_of(sums: impl Iterator<Item = (usize, Sums)> + Clone) -> Option<Errors> {
+    let estimated = |squares: fn(&Sums) -> f64| {
+        let one =
+            |(point, sums): (usize, Sums)| SegmentSum { point, squares: squares(&sums), count: sums.count };
+        Estimated::of(&sums.clone().map(one).collect::<Vec<_>>())
     };
     Some(Errors {
-        px: Estimated::of(&sums(Carried::square_px2))?,
-        angle_rad: Estimated::of(&sums(|s| f64::from(s.angle_rad).powi(2))),
-        offset_m: Estimated::of(&sums(|s| f64::from(s.offset_m).powi(2))),
+        px: estimated(|s| s.px2)?,
+        angle_rad: estimated(|s| s.rad2),
+        offset_m: estimated(|s| s.m2),
     })
 }
 
-/// The errors at `at` seconds or metres, where `since_keyframe` says for two frames how far apart they are; or how many
-/// segments reach far enough, where these are too few.
+/// The errors of all held samples of segments, by the point that each is of; `None` where there are none.
+pub fn errors(segments: &[(usize, &SegmentErrors)]) -> Option<Errors> {
+    errors_of(segments.iter().map(|(point, segment)| (*point, segment.all)))
+}
+
+/// The errors in a window; or how many segments reach far enough, where these are too few.
 ///
 /// # Errors
-/// The number of segments that reach 1.2 `at`, below [`FEWEST_SEGMENTS`].
-pub fn errors_at(
-    segments: &[CarriedSegment],
-    aside: &[Aside],
-    at: f64,
-    since_keyframe: impl Fn(u32, u32) -> f64,
-) -> Result<Errors, usize> {
-    let (low, high) = (at * (WINDOW.0 - SLACK), at * (WINDOW.1 + SLACK));
-    let since = |segment: &CarriedSegment, sample: &Carried| since_keyframe(segment.keyframe, sample.frame);
-    let reaches = |(segment, aside): &(&CarriedSegment, &Aside)| {
-        let last = aside.held(segment).last();
-        last.is_some_and(|s| since(segment, s) >= at * (WINDOW.1 - SLACK))
-    };
-    let reaching = segments.iter().zip(aside).filter(reaches).count();
+/// The number of segments that reach 1.2 times the age or motion, below [`FEWEST_SEGMENTS`].
+pub fn errors_at(segments: &[(usize, &SegmentErrors)], window: Window) -> Result<Errors, usize> {
+    let far = window.at() * (WINDOW.1 - SLACK);
+    let reaching = segments.iter().filter(|(_, s)| s.last[window.kind()] >= far).count();
     if reaching < FEWEST_SEGMENTS {
         return Err(reaching);
     }
-    errors(segments, aside, |segment, sample| (low..=high).contains(&since(segment, sample))).ok_or(reaching)
+    let number = window.number();
+    let in_window = segments.iter().filter_map(|(point, segment)| {
+        let (_, sums) = segment.windows.iter().find(|(n, _)| *n == number)?;
+        Some((*point, *sums))
+    });
+    errors_of(in_window).ok_or(reaching)
 }
 
 #[cfg(test)]
@@ -80,24 +202,24 @@ mod tests {
     use super::*;
 
     /// Errors that grow by a pixel a second, at ten samples a second.
-    fn segments(count: usize, frames: u32) -> Vec<CarriedSegment> {
-        let sample = |frame: u32| Carried {
-            frame,
-            residual_px: [0.1 * f64::from(frame), 0.0],
-            angle_rad: 1e-3 * frame as f32,
-            offset_m: if frame == 30 { f32::NAN } else { 0.5 },
-        };
-        let segment =
-            |point| CarriedSegment { point, keyframe: 0, samples: (1..=frames).map(sample).collect() };
-        (0..count).map(segment).collect()
+    fn segments(count: usize, frames: u32) -> Vec<SegmentErrors> {
+        let squares: Vec<f64> = (1..=frames).map(|frame| (0.1 * f64::from(frame)).powi(2)).collect();
+        let angles: Vec<f32> = (1..=frames).map(|frame| 1e-3 * frame as f32).collect();
+        let offsets: Vec<f32> = (1..=frames).map(|frame| if frame == 30 { f32::NAN } else { 0.5 }).collect();
+        let samples = Samples { squares_px2: &squares, angle_rad: &angles, offset_m: &offsets };
+        let segment = SegmentErrors::of(&samples, |i| 0.1 * (i as f64 + 1.0), |_| 0.0);
+        vec![segment; count]
+    }
+
+    fn numbered(list: &[SegmentErrors]) -> Vec<(usize, &SegmentErrors)> {
+        list.iter().enumerate().collect()
     }
 
     #[test]
     fn an_age_is_its_window_and_needs_five_segments_that_reach_beyond() {
-        let age = |key: u32, frame: u32| 0.1 * f64::from(frame - key);
+        let at = |list: &[SegmentErrors], age: usize| errors_at(&numbered(list), Window::Age(age));
         let list = segments(5, 24);
-        let none = vec![Aside::default(); 5];
-        let at_one = errors_at(&list, &none, 1.0, age).unwrap();
+        let at_one = at(&list, 0).unwrap();
         let expected = ((8..=12).map(|i| 0.01 * f64::from(i * i)).sum::<f64>() / 5.0).sqrt();
         assert!((at_one.px.rmse - expected).abs() < 1e-12, "{}", at_one.px.rmse);
         assert_eq!(at_one.px.samples, 25);
@@ -106,15 +228,33 @@ mod tests {
                 && (at_one.angle_rad.unwrap().rmse - 0.01 * expected / 1.0).abs() < 1e-6
         );
         assert_eq!(at_one.offset_m.unwrap().rmse, 0.5);
-        assert!(errors_at(&list, &none, 2.0, age).is_ok(), "2.4 s is reached");
-        assert_eq!(errors_at(&segments(5, 23), &none, 2.0, age), Err(0));
-        assert_eq!(errors_at(&segments(4, 24), &none[..4], 2.0, age), Err(4));
+        assert!(at(&list, 1).is_ok(), "2.4 s is reached");
+        assert_eq!(at(&segments(5, 23), 1), Err(0));
+        assert_eq!(at(&segments(4, 24), 1), Err(4));
         // A segment that is set aside reaches nothing.
-        let mut aside = none.clone();
-        aside[2].keyframe_px = Some(9.0);
-        assert_eq!(errors_at(&list, &aside, 2.0, age), Err(4));
+        let mut aside = list.clone();
+        aside[2] = SegmentErrors::default();
+        assert_eq!(at(&aside, 1), Err(4));
         // A label without a ray leaves the offset unknown, not smaller.
-        let all = errors(&segments(5, 30), &none, |_, _| true).unwrap();
+        let list = segments(5, 30);
+        let all = errors(&numbered(&list)).unwrap();
         assert!(all.offset_m.is_none() && all.angle_rad.is_some());
+        assert_eq!((all.px.samples, all.px.points), (150, 5));
+        assert!(errors(&numbered(&[SegmentErrors::default()])).is_none());
+        assert_eq!(errors_at(&numbered(&list), Window::Motion(0)), Err(0));
+    }
+
+    #[test]
+    fn the_window_is_found_wherever_it_lies() {
+        for count in 1..40 {
+            for from in 0..40 {
+                let since = |i: usize| 0.05 * (from + i) as f64;
+                let found = around(1.0, count, since);
+                let inside: Vec<usize> = (0..count)
+                    .filter(|i| (WINDOW.0 - SLACK..=WINDOW.1 + SLACK).contains(&since(*i)))
+                    .collect();
+                assert_eq!(found.collect::<Vec<_>>(), inside);
+            }
+        }
     }
 }

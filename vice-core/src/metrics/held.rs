@@ -13,8 +13,9 @@
 //!   at most half of that.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
-use crate::statistics::median;
+use crate::statistics::{median, median_in_parts};
 
 /// Median of the length of a vector of two Gaussian components of deviation one.
 const MEDIAN_LENGTH: f64 = 1.1774;
@@ -23,35 +24,29 @@ const DEVIATIONS: f64 = 5.0;
 /// And never below this, px: labels are not better than that.
 const LEAST_PX: f64 = 2.5;
 
-/// One scored label of a segment.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Carried {
-    /// Its frame, by any numbering that grows with time and is the same for all points.
-    pub frame: u32,
-    /// Where the point was carried minus where the label is, px.
-    pub residual_px: [f64; 2],
-    /// Angle between the rays of the two, radians; NaN where the label has no ray.
-    pub angle_rad: f32,
-    /// Distance between the rays at the depth of the carried point, metres; NaN where the label has no ray.
-    pub offset_m: f32,
-}
+/// The scored labels of all segments, each from one point's key frame on, in time. Frames are in any numbering that grows
+/// with time and is the same for all points; segments of a point do not overlap.
+pub trait Segments {
+    /// How many segments.
+    fn count(&self) -> usize;
 
-impl Carried {
-    /// The squared error, px².
-    pub fn square_px2(&self) -> f64 {
-        self.residual_px[0] * self.residual_px[0] + self.residual_px[1] * self.residual_px[1]
-    }
-}
+    /// Which point a segment is of.
+    fn point(&self, segment: usize) -> usize;
 
-/// The scored labels of one point from one key frame on, in time.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CarriedSegment {
-    /// Which point; segments of a point do not overlap.
-    pub point: usize,
     /// Frame of the key frame.
-    pub keyframe: u32,
-    /// The samples, in time.
-    pub samples: Vec<Carried>,
+    fn keyframe(&self, segment: usize) -> u32;
+
+    /// Frames of the samples.
+    fn frames(&self, segment: usize) -> Vec<u32>;
+
+    /// By how much each sample is off from the median of the five around it, px.
+    fn jumps_px(&self, segment: usize) -> &[f32];
+
+    /// Length of the median of the first three residuals, px; `None` where there is no sample.
+    fn start_px(&self, segment: usize) -> Option<f64>;
+
+    /// Where the point was carried minus where the label is, of some samples, px.
+    fn residuals(&self, segment: usize, samples: Range<usize>) -> Vec<[f64; 2]>;
 }
 
 /// What is set aside of a segment.
@@ -59,142 +54,139 @@ pub struct CarriedSegment {
 pub struct Aside {
     /// By how much its key frame is off, px, where that sets the whole segment aside.
     pub keyframe_px: Option<f64>,
-    /// Single samples: their place in the segment, and by how much they jump, px.
+    /// Single samples: their place in the segment, ascending, and by how much they jump, px.
     pub labels: Vec<(usize, f64)>,
 }
 
-impl Aside {
-    /// The samples of the segment that hold.
-    pub fn held<'a>(&'a self, segment: &'a CarriedSegment) -> impl Iterator<Item = &'a Carried> {
-        let mut next = self.labels.iter().map(|(place, _)| *place).peekable();
-        let samples = if self.keyframe_px.is_some() { &[][..] } else { &segment.samples };
-        samples.iter().enumerate().filter_map(move |(place, sample)| {
-            if next.next_if_eq(&place).is_some() { None } else { Some(sample) }
-        })
-    }
-}
-
-/// What to set aside of each segment, in their order.
-pub fn set_aside(segments: &[CarriedSegment]) -> Vec<Aside> {
-    let mut aside = vec![Aside::default(); segments.len()];
+/// What to set aside, by segment; of those that are not named nothing is.
+pub fn set_aside(segments: &impl Segments) -> BTreeMap<usize, Aside> {
+    let mut aside = BTreeMap::new();
     let by_point = by_point(segments);
     if by_point.len() < 2 {
         return aside;
     }
-    labels(segments, &mut aside);
+    labels(segments, &by_point, &mut aside);
     keyframes(segments, &by_point, &mut aside);
     aside
 }
 
-fn by_point(segments: &[CarriedSegment]) -> BTreeMap<usize, Vec<&CarriedSegment>> {
-    let mut by_point: BTreeMap<usize, Vec<&CarriedSegment>> = BTreeMap::new();
-    for segment in segments {
-        by_point.entry(segment.point).or_default().push(segment);
+/// The segments of each point, in time.
+fn by_point(segments: &impl Segments) -> BTreeMap<usize, Vec<usize>> {
+    let mut by_point: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for segment in 0..segments.count() {
+        by_point.entry(segments.point(segment)).or_default().push(segment);
     }
-    by_point.values_mut().for_each(|list| list.sort_by_key(|s| s.keyframe));
+    by_point.values_mut().for_each(|list| list.sort_by_key(|s| segments.keyframe(*s)));
     by_point
 }
 
-fn labels(segments: &[CarriedSegment], aside: &mut [Aside]) {
-    let jumps: Vec<Vec<f32>> = segments.iter().map(|s| jumps_px(&s.samples)).collect();
-    let mut above_zero: Vec<f64> =
-        jumps.iter().flatten().filter(|d| **d > 0.0).map(|d| f64::from(*d)).collect();
-    let Some(typical) = median(&mut above_zero) else { return };
-    drop(above_zero);
+/// A label that jumps: its frame, segment and place there.
+type Jump = (u32, usize, usize);
+
+fn labels(
+    segments: &impl Segments,
+    by_point: &BTreeMap<usize, Vec<usize>>,
+    aside: &mut BTreeMap<usize, Aside>,
+) {
+    let parts: Vec<&[f32]> = (0..segments.count()).map(|s| segments.jumps_px(s)).collect();
+    let Some(typical) = median_in_parts(&parts, |d| *d > 0.0) else { return };
     let limit = LEAST_PX.max(DEVIATIONS * typical / MEDIAN_LENGTH);
     let flagged = |d: &f32| f64::from(*d) > limit;
-    let mut at_frame: BTreeMap<u32, Vec<(usize, f64)>> = BTreeMap::new();
-    for (segment, jumps) in segments.iter().zip(&jumps) {
-        for (sample, _) in segment.samples.iter().zip(jumps).filter(|(_, d)| flagged(d)) {
-            at_frame.entry(sample.frame).or_default();
-        }
+    let mut jumps: Vec<Jump> = Vec::new();
+    for (segment, part) in parts.iter().enumerate().filter(|(_, part)| part.iter().any(flagged)) {
+        let frames = segments.frames(segment);
+        let of_segment = part.iter().enumerate().filter(|(_, d)| flagged(d));
+        jumps.extend(of_segment.map(|(place, _)| (frames[place], segment, place)));
     }
-    if at_frame.is_empty() {
-        return;
-    }
-    for (segment, jumps) in segments.iter().zip(&jumps) {
-        for (sample, d) in segment.samples.iter().zip(jumps) {
-            if let Some(list) = at_frame.get_mut(&sample.frame) {
-                list.push((segment.point, f64::from(*d)));
-            }
-        }
-    }
-    for ((segment, jumps), aside) in segments.iter().zip(&jumps).zip(aside) {
-        for (place, (sample, d)) in
-            segment.samples.iter().zip(jumps).enumerate().filter(|(_, (_, d))| flagged(d))
-        {
-            let others = at_frame.get(&sample.frame).map_or(&[][..], Vec::as_slice);
-            let mut others: Vec<f64> =
-                others.iter().filter(|(point, _)| *point != segment.point).map(|(_, d)| *d).collect();
+    jumps.sort_unstable();
+    let mut cursors: Vec<Cursor<'_>> =
+        by_point.iter().map(|(point, list)| Cursor { point: *point, list, at: 0, frames: None }).collect();
+    for at_frame in jumps.chunk_by(|a, b| a.0 == b.0) {
+        let frame = at_frame[0].0;
+        let seen: Vec<(usize, f64)> = cursors
+            .iter_mut()
+            .filter_map(|cursor| Some((cursor.point, f64::from(cursor.jump_at(segments, frame)?))))
+            .collect();
+        for (_, segment, place) in at_frame {
+            let point = segments.point(*segment);
+            let mut others: Vec<f64> = seen.iter().filter(|(p, _)| *p != point).map(|(_, d)| *d).collect();
             if median(&mut others).is_some_and(|typical| typical <= 0.5 * limit) {
-                aside.labels.push((place, f64::from(*d)));
+                let off_px = f64::from(parts[*segment][*place]);
+                aside.entry(*segment).or_default().labels.push((*place, off_px));
             }
         }
+    }
+}
+
+/// Goes through the segments of a point in time.
+struct Cursor<'a> {
+    point: usize,
+    list: &'a [usize],
+    at: usize,
+    /// Frames of the segment that was looked at last, and which it is.
+    frames: Option<(usize, Vec<u32>)>,
+}
+
+impl Cursor<'_> {
+    /// By how much the point's label in a frame jumps; frames are asked in ascending order.
+    fn jump_at(&mut self, segments: &impl Segments, frame: u32) -> Option<f32> {
+        while self.list.get(self.at + 1).is_some_and(|next| segments.keyframe(*next) <= frame) {
+            self.at += 1;
+        }
+        let segment = self.list[self.at];
+        if self.frames.as_ref().is_none_or(|(of, _)| *of != segment) {
+            self.frames = Some((segment, segments.frames(segment)));
+        }
+        let (_, frames) = self.frames.as_ref()?;
+        Some(segments.jumps_px(segment)[frames.binary_search(&frame).ok()?])
     }
 }
 
 fn keyframes(
-    segments: &[CarriedSegment],
-    by_point: &BTreeMap<usize, Vec<&CarriedSegment>>,
-    aside: &mut [Aside],
+    segments: &impl Segments,
+    by_point: &BTreeMap<usize, Vec<usize>>,
+    aside: &mut BTreeMap<usize, Aside>,
 ) {
-    let starts: Vec<Option<f64>> = segments.iter().map(start_px).collect();
+    let starts: Vec<Option<f64>> = (0..segments.count()).map(|s| segments.start_px(s)).collect();
     let Some(typical) = median(&mut starts.iter().copied().flatten().collect::<Vec<f64>>()) else { return };
     let limit = LEAST_PX.max(DEVIATIONS * typical / MEDIAN_LENGTH);
-    for ((segment, start), aside) in segments.iter().zip(starts).zip(aside) {
+    for (segment, start) in starts.into_iter().enumerate() {
         let Some(start) = start.filter(|g| *g > limit) else { continue };
-        let others = by_point.iter().filter(|(point, _)| **point != segment.point);
-        let mut steps: Vec<f64> = others.filter_map(|(_, list)| step_px(list, segment.keyframe)).collect();
+        let (point, keyframe) = (segments.point(segment), segments.keyframe(segment));
+        let others = by_point.iter().filter(|(other, _)| **other != point);
+        let mut steps: Vec<f64> = others.filter_map(|(_, list)| step_px(segments, list, keyframe)).collect();
         if median(&mut steps).is_some_and(|typical| typical <= 0.5 * limit) {
-            aside.keyframe_px = Some(start);
+            aside.entry(segment).or_default().keyframe_px = Some(start);
         }
     }
-}
-
-/// By how much each sample is off from the median of the five around it; zero where there are fewer than three.
-fn jumps_px(samples: &[Carried]) -> Vec<f32> {
-    let jump = |i: usize| {
-        let around = &samples[i.saturating_sub(2)..samples.len().min(i + 3)];
-        if around.len() < 3 {
-            return 0.0;
-        }
-        let (middle, r) = (median_residual(around), samples[i].residual_px);
-        length([r[0] - middle[0], r[1] - middle[1]]) as f32
-    };
-    (0..samples.len()).map(jump).collect()
-}
-
-/// By how much a segment is off from the start.
-fn start_px(segment: &CarriedSegment) -> Option<f64> {
-    let first = &segment.samples[..segment.samples.len().min(3)];
-    (!first.is_empty()).then(|| length(median_residual(first)))
 }
 
 /// The step that a point makes at a frame: from the last three residuals up to it to the next three; from none at all
 /// where its key frame is the same. `None` where it is not seen then.
-fn step_px(of_point: &[&CarriedSegment], frame: u32) -> Option<f64> {
-    let segment = of_point[..of_point.partition_point(|s| s.keyframe <= frame)].last()?;
-    let after = segment.samples.partition_point(|s| s.frame <= frame);
-    let next = &segment.samples[after..segment.samples.len().min(after + 3)];
-    if next.is_empty() {
+fn step_px(segments: &impl Segments, of_point: &[usize], frame: u32) -> Option<f64> {
+    let segment = *of_point[..of_point.partition_point(|s| segments.keyframe(*s) <= frame)].last()?;
+    let frames = segments.frames(segment);
+    let after = frames.partition_point(|f| *f <= frame);
+    let end = frames.len().min(after + 3);
+    if after == end {
         return None;
     }
+    let before = after.saturating_sub(3);
+    let around = segments.residuals(segment, before..end);
+    let (last, next) = around.split_at_checked(after - before)?;
     let next = median_residual(next);
     // At its key frame a point is where its label is.
-    let last = match &segment.samples[after.saturating_sub(3)..after] {
-        [] => [0.0; 2],
-        last => median_residual(last),
-    };
+    let last = if last.is_empty() { [0.0; 2] } else { median_residual(last) };
     Some(length([next[0] - last[0], next[1] - last[1]]))
 }
 
-fn median_residual(samples: &[Carried]) -> [f64; 2] {
-    [0, 1].map(|axis| {
-        let mut values = [0.0; 5];
-        let values = &mut values[..samples.len()];
-        values.iter_mut().zip(samples).for_each(|(v, s)| *v = s.residual_px[axis]);
-        median(values).unwrap_or(0.0)
-    })
+fn median_residual(residuals: &[[f64; 2]]) -> [f64; 2] {
+    [0, 1].map(|axis| median_of(&residuals.iter().map(|r| r[axis]).collect::<Vec<f64>>()))
+}
+
+/// The median of a few numbers, zero of none.
+pub(crate) fn median_of(values: &[f64]) -> f64 {
+    median(&mut values.to_vec()).unwrap_or(0.0)
 }
 
 fn length(v: [f64; 2]) -> f64 {
@@ -206,18 +198,69 @@ fn length(v: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
 
+    /// The samples of one point from one key frame on: frame and residual.
+    struct Segment {
+        point: usize,
+        keyframe: u32,
+        samples: Vec<(u32, [f64; 2])>,
+        jumps_px: Vec<f32>,
+    }
+
+    impl Segment {
+        fn new(point: usize, keyframe: u32, samples: Vec<(u32, [f64; 2])>) -> Self {
+            let residuals: Vec<[f64; 2]> = samples.iter().map(|s| s.1).collect();
+            let jump = |i: usize| {
+                let around = &residuals[i.saturating_sub(2)..residuals.len().min(i + 3)];
+                let middle = median_residual(around);
+                let off = length([residuals[i][0] - middle[0], residuals[i][1] - middle[1]]);
+                if around.len() < 3 { 0.0 } else { off as f32 }
+            };
+            Self { point, keyframe, jumps_px: (0..residuals.len()).map(jump).collect(), samples }
+        }
+    }
+
+    impl Segments for &[Segment] {
+        fn count(&self) -> usize {
+            self.len()
+        }
+        fn point(&self, segment: usize) -> usize {
+            self[segment].point
+        }
+        fn keyframe(&self, segment: usize) -> u32 {
+            self[segment].keyframe
+        }
+        fn frames(&self, segment: usize) -> Vec<u32> {
+            self[segment].samples.iter().map(|s| s.0).collect()
+        }
+        fn jumps_px(&self, segment: usize) -> &[f32] {
+            &self[segment].jumps_px
+        }
+        fn start_px(&self, segment: usize) -> Option<f64> {
+            let first = self.residuals(segment, 0..self[segment].samples.len().min(3));
+            (!first.is_empty()).then(|| length(median_residual(&first)))
+        }
+        fn residuals(&self, segment: usize, samples: Range<usize>) -> Vec<[f64; 2]> {
+            self[segment].samples[samples].iter().map(|s| s.1).collect()
+        }
+    }
+
+    fn set_aside(segments: &[Segment]) -> Vec<Aside> {
+        let found = super::set_aside(&segments);
+        (0..segments.len()).map(|i| found.get(&i).cloned().unwrap_or_default()).collect()
+    }
+
     /// A small wobble that is the same on every run, px.
     fn wobble(point: usize, frame: u32) -> [f64; 2] {
         let at = f64::from(frame) * 1.7 + point as f64 * 2.3;
         [0.4 * at.sin(), 0.4 * (1.3 * at).cos()]
     }
 
-    fn segment(point: usize, keyframe: u32, count: u32, more: impl Fn(u32) -> f64) -> CarriedSegment {
+    fn segment(point: usize, keyframe: u32, count: u32, more: impl Fn(u32) -> f64) -> Segment {
         let sample = |frame: u32| {
             let [u, v] = wobble(point, frame);
-            Carried { frame, residual_px: [u + more(frame), v], angle_rad: 0.0, offset_m: 0.0 }
+            (frame, [u + more(frame), v])
         };
-        CarriedSegment { point, keyframe, samples: (keyframe + 1..=keyframe + count).map(sample).collect() }
+        Segment::new(point, keyframe, (keyframe + 1..=keyframe + count).map(sample).collect())
     }
 
     #[test]
@@ -249,8 +292,7 @@ mod tests {
         ];
         let found = set_aside(&blunder);
         assert!(found[1].keyframe_px.is_some_and(|px| (px - 8.0).abs() < 1.0), "{found:?}");
-        assert_eq!(found[1].held(&blunder[1]).count(), 0);
-        assert_eq!(found[0].held(&blunder[0]).count(), 20);
+        assert!(found[0].labels.is_empty());
         assert!([0, 2, 3].iter().all(|i| found[*i].keyframe_px.is_none()));
         // The estimate jumps right after that key frame: the other points step as well.
         let jump = |f: u32| if f > 21 { 8.0 } else { 0.0 };
@@ -274,9 +316,7 @@ mod tests {
     #[test]
     fn exact_labels_and_short_segments_are_kept() {
         let exact = |point, keyframe, count| {
-            let mut s = segment(point, keyframe, count, |_| 0.0);
-            s.samples.iter_mut().for_each(|s| s.residual_px = [0.0; 2]);
-            s
+            Segment::new(point, keyframe, (keyframe + 1..=keyframe + count).map(|f| (f, [0.0; 2])).collect())
         };
         let found = set_aside(&[exact(0, 0, 2), exact(0, 3, 1), exact(1, 0, 9), exact(2, 0, 0)]);
         assert!(found.iter().all(|a| *a == Aside::default()));

@@ -40,6 +40,7 @@ pub struct SubsetRmse {
 
 impl SquaredErrors {
     /// Adds one error.
+    #[inline]
     pub fn add(&mut self, error_px: f64) {
         self.sum_px2 += error_px * error_px;
         self.count += 1;

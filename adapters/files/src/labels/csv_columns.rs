@@ -1,6 +1,7 @@
 //! Which column of a table of labels holds what, by its name.
 
 use vice_core::error::{DataError, DataResult};
+use vice_core::suspicion::Suspicion;
 use vice_core::time::{Stamp, TimeError};
 
 use crate::columns::{ColumnName, Quantity, TimeUnit};
@@ -100,12 +101,26 @@ impl Columns {
             TimeUnit::Seconds if text.bytes().all(|b| b.is_ascii_digit()) => TimeUnit::Nanos,
             shown => shown,
         };
-        match *self.unit.get_or_insert_with(by_size) {
-            TimeUnit::Seconds => Stamp::parse_seconds(text),
-            TimeUnit::Millis => Stamp::parse_millis(text),
-            TimeUnit::Micros => Stamp::parse_micros(text),
-            TimeUnit::Nanos => Stamp::parse_nanos(text),
+        self.unit.get_or_insert_with(by_size);
+        self.stamp_in_unit(text)
+    }
+
+    /// A stamp in the unit that is known by now.
+    pub(super) fn stamp_in_unit(&self, text: &str) -> Result<Stamp, TimeError> {
+        match self.unit {
+            Some(TimeUnit::Seconds) => Stamp::parse_seconds(text),
+            Some(TimeUnit::Millis) => Stamp::parse_millis(text),
+            Some(TimeUnit::Micros) => Stamp::parse_micros(text),
+            Some(TimeUnit::Nanos) | None => Stamp::parse_nanos(text),
         }
+    }
+
+    /// What is to be said of columns that are not known.
+    pub(super) fn unknown_said(&self) -> Option<Suspicion> {
+        let names = self.unknown.join(", ");
+        (!names.is_empty()).then(|| {
+            Suspicion::new("label-columns", "", "columns that are not known are passed over").evidence(names)
+        })
     }
 
     /// The unit of the stamps, where the name of their column says it or a row has shown it.

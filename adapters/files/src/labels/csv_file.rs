@@ -5,7 +5,6 @@ use std::io::{self, Write};
 use vice_core::camera::Pixel;
 use vice_core::error::{DataError, DataResult};
 use vice_core::label::{LabelSet, LabelSetBuilder, Observation, ObservationSource};
-use vice_core::suspicion::Suspicion;
 
 use super::csv_columns::Columns;
 use super::{LabelFile, label_error, no_labels, rounded};
@@ -89,12 +88,7 @@ pub(super) fn read_sifted(bytes: &[u8], passed: u64) -> DataResult<LabelFile> {
         labels.finish().map_err(|e| if few > 0 { rounded::error(most_digits) } else { label_error(e) })?;
     let mut file = LabelFile::of(labels);
     file.suspicions = lenient.suspicions("");
-    if !columns.unknown.is_empty() {
-        file.suspicions.add(
-            Suspicion::new("label-columns", "", "columns that are not known are passed over")
-                .evidence(columns.unknown.join(", ")),
-        );
-    }
+    file.suspicions.extend(columns.unknown_said());
     Ok(file)
 }
 

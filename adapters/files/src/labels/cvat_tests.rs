@@ -45,8 +45,8 @@ fn what_cvat_exports_is_read() {
             (frames[9], 49.5, "manual", true, false, 9),
         ]
     );
-    assert!(labels.points()[1].observations[0].uncertain);
-    let tip = labels.points()[2].observations[0];
+    assert!(labels.points()[1].observations.first().unwrap().uncertain);
+    let tip = labels.points()[2].observations.first().unwrap();
     assert_eq!((tip.px, tip.source.name()), (Pixel::new(0.0, 0.0), "auto"));
 }
 
@@ -122,7 +122,7 @@ proptest! {
             prop_assert_eq!(a.observations.len(), b.observations.len());
             for (a, b) in a.observations.iter().zip(&b.observations) {
                 prop_assert!(a.px.distance_px(b.px) < 1e-9);
-                prop_assert_eq!(Observation { px: b.px, line: 0, ..*a }, *b);
+                prop_assert_eq!(Observation { px: b.px, line: 0, ..a }, b);
             }
         }
     }

@@ -9,6 +9,7 @@
 //! | pickle | `{point: {frame index: (array([x, y]), is_keyframe)}}`, as the paper's authors stored them; read only |
 
 mod chosen;
+mod csv_blocks;
 mod csv_columns;
 mod csv_file;
 mod cvat;
@@ -142,6 +143,8 @@ pub fn read_file(path: impl AsRef<Path>, frame_stamps: Option<&[Stamp]>) -> Data
     let path = path.as_ref();
     let file = if parquet::is_parquet(path)? {
         parquet::read_parquet(path, None).map_err(|e| e.at(path))?
+    } else if let Some(file) = csv_blocks::read(path) {
+        file
     } else {
         let bytes = read_bytes(path)?;
         if let Some(what) = crate::not_text::what(&bytes) {
@@ -168,7 +171,7 @@ pub fn read_points(
     let path = path.as_ref();
     if parquet::is_parquet(path)? {
         let file = parquet::read_parquet(path, Some(points)).map_err(|e| e.at(path))?;
-        let stamps = || file.labels.points().iter().flat_map(|p| &p.observations).map(|o| o.stamp);
+        let stamps = || file.labels.points().iter().flat_map(|p| p.observations.stamps()).copied();
         let at_a_frame = frame_stamps.is_none_or(|f| stamps().any(|s| f.binary_search(&s).is_ok()));
         if at_a_frame && let Ok(file) = of_points(file, points) {
             return Ok(about(path, file));
@@ -176,7 +179,7 @@ pub fn read_points(
     } else if let Some(sifted) = chosen::sift(path, points, frame_stamps) {
         let file = csv_file::read_sifted(&sifted.bytes, sifted.passed).map_err(|e| e.at(path))?;
         let frames = frame_stamps.unwrap_or_default();
-        let stamps = || file.labels.points().iter().flat_map(|p| &p.observations).map(|o| o.stamp);
+        let stamps = || file.labels.points().iter().flat_map(|p| p.observations.stamps()).copied();
         // Whether stamps were rounded is asked of all of them where none is at a frame.
         if (sifted.at_a_frame || stamps().any(|s| frames.binary_search(&s).is_ok()))
             && let Ok(file) = of_points(file, points)

@@ -24,7 +24,7 @@ pub(super) fn error(digits: usize) -> DataError {
 
 /// Refuses labels none of which is at a frame, and whose stamps all end in zeros that those of the frames do not.
 pub(super) fn check(labels: &LabelSet, frames: &[Stamp]) -> DataResult<()> {
-    let stamps = || labels.points().iter().flat_map(|p| &p.observations).map(|o| o.stamp);
+    let stamps = || labels.points().iter().flat_map(|p| p.observations.stamps()).copied();
     if frames.is_empty() || stamps().any(|s| frames.binary_search(&s).is_ok()) {
         return Ok(());
     }

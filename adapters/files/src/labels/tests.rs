@@ -32,15 +32,15 @@ fn columns_are_found_by_name() {
     .unwrap();
     let names: Vec<&str> = labels.points().iter().map(|p| p.name.as_str()).collect();
     assert_eq!(names, ["a,b", "p 10"]);
-    let [first, second] = labels.points()[1].observations[..] else { panic!() };
+    let [first, second] = labels.points()[1].observations.iter().collect::<Vec<_>>()[..] else { panic!() };
     assert_eq!(
         (first.px, first.keyframe, first.source),
         (Pixel::new(1.5, 2.5), true, ObservationSource::Manual)
     );
     assert_eq!((second.occluded, second.uncertain, second.source), (true, true, ObservationSource::Auto));
     assert_eq!((first.line, second.line), (2, 5));
-    assert!(labels.points()[0].observations[0].uncertain);
-    assert_eq!(labels.points()[0].observations[0].line, 6);
+    assert!(labels.points()[0].observations.first().unwrap().uncertain);
+    assert_eq!(labels.points()[0].observations.first().unwrap().line, 6);
 }
 
 #[test]
@@ -79,7 +79,7 @@ fn schemas_are_told_apart() {
     )
     .unwrap();
     assert_eq!((labels.camera.as_deref(), labels.dataset.as_deref()), (Some("cam0"), None));
-    let o = labels.points()[0].observations[0];
+    let o = labels.points()[0].observations.first().unwrap();
     assert_eq!((o.px, o.keyframe, o.source), (Pixel::new(1.0, 2.5), false, ObservationSource::Manual));
 
     let says = |text: &str, expected: &str| {
@@ -165,7 +165,7 @@ fn text_of_python_2_is_read() {
                    S'\\x00\\x00\\x80?\\x00\\x00\\x00@'\ntbI1\ntss.";
     let labels = read_pickle(pickle, &stamps(2)).unwrap();
     assert_eq!(labels.points()[0].name, "p");
-    assert_eq!(labels.points()[0].observations[0].px, Pixel::new(1.0, 2.0));
+    assert_eq!(labels.points()[0].observations.first().unwrap().px, Pixel::new(1.0, 2.0));
 }
 
 #[test]
@@ -245,7 +245,7 @@ pub(super) fn any_labels() -> impl Strategy<Value = LabelSet> {
 }
 
 fn without_lines(labels: &LabelSet) -> Vec<(String, Vec<Observation>)> {
-    let bare = |o: &Observation| Observation { line: 0, provenance: Provenance::default(), ..*o };
+    let bare = |o: Observation| Observation { line: 0, provenance: Provenance::default(), ..o };
     labels.points().iter().map(|p| (p.name.clone(), p.observations.iter().map(bare).collect())).collect()
 }
 
@@ -288,7 +288,7 @@ fn columns_of_labels_have_other_names_and_units_too() {
     ] {
         let file = read_csv_file(text.as_bytes()).unwrap_or_else(|e| panic!("{e}\n{text}"));
         let point = &file.labels.points()[0];
-        let o = point.observations[0];
+        let o = point.observations.first().unwrap();
         assert_eq!(
             (point.name.as_str(), o.stamp.as_nanos(), o.px),
             ("a", 1_500_000_000, Pixel::new(1.5, 2.5)),

@@ -7,6 +7,7 @@ use pulp::Simd;
 use super::super::solve;
 use super::{Camera, Motion};
 use crate::camera::{Distortion, Pixel};
+use crate::frames::Varying;
 use crate::lanes::{Kernel, Lanes, Masked, Number, Yes};
 
 /// No distortion.
@@ -54,9 +55,14 @@ impl<D: Distortion> Bound<D> {
         Self { camera: *camera, lens, max_r2, per_fx_fy, quick_radius }
     }
 
+    /// The camera itself.
+    pub(crate) const fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
     /// Pixel, and whether there is one.
     #[inline(always)]
-    fn project<S: Simd>(&self, [x, y, z]: [Lanes<S>; 3]) -> ([Lanes<S>; 2], Yes<S>) {
+    pub(crate) fn project<S: Simd>(&self, [x, y, z]: [Lanes<S>; 3]) -> ([Lanes<S>; 2], Yes<S>) {
         let (x, y) = (x / z, y / z);
         let r2 = x * x + y * y;
         let valid = z.both(z.of(0.0).below(z), r2.at_most(r2.of(self.max_r2)));
@@ -66,7 +72,7 @@ impl<D: Distortion> Bound<D> {
 
     /// Ray, whether there is one, and where the single-point function must decide.
     #[inline(always)]
-    fn unproject<S: Simd>(&self, [u, v]: [Lanes<S>; 2]) -> ([Lanes<S>; 2], Yes<S>, Yes<S>) {
+    pub(crate) fn unproject<S: Simd>(&self, [u, v]: [Lanes<S>; 2]) -> ([Lanes<S>; 2], Yes<S>, Yes<S>) {
         let c = &self.camera;
         let (xd, yd) = ((u - c.cx) * self.per_fx_fy[0], (v - c.cy) * self.per_fx_fy[1]);
         if !D::DISTORTS {
@@ -153,6 +159,28 @@ impl<D: Distortion> Kernel<1, 2> for Track<D> {
     fn single(&self, [u, v]: [f64; 2], [z_m]: [f64; 1]) -> Option<[f64; 2]> {
         let ray: Vector3<f64> = self.bound.camera.unproject(Pixel::new(u, v)).ok()?;
         let point = self.now_from_keyframe.apply([ray.x * z_m, ray.y * z_m, z_m]);
+        self.bound.camera.project(&Point3::from(point)).ok().map(Into::into)
+    }
+}
+
+/// Equation 1 the other way round: one point of a key frame in many cameras.
+#[derive(Clone, Copy)]
+pub(crate) struct TrackAlong<D> {
+    pub(crate) bound: Bound<D>,
+    pub(crate) at_keyframe: Motion,
+    pub(crate) point_m: [f64; 3],
+}
+
+impl<D: Distortion> Kernel<7, 2> for TrackAlong<D> {
+    #[inline(always)]
+    fn lanes<S: Simd>(&self, _: [Lanes<S>; 2], camera_from_world: [Lanes<S>; 7]) -> Masked<S, 2> {
+        let point = Varying::of(camera_from_world).times(&self.at_keyframe).apply(self.point_m);
+        let (numbers, valid) = self.bound.project(point);
+        Masked { numbers, valid, unsure: None }
+    }
+
+    fn single(&self, _: [f64; 2], camera_from_world: [f64; 7]) -> Option<[f64; 2]> {
+        let point = Varying::of(camera_from_world).times(&self.at_keyframe).apply(self.point_m);
         self.bound.camera.project(&Point3::from(point)).ok().map(Into::into)
     }
 }

@@ -12,7 +12,7 @@ use super::Camera;
 use crate::frames::{self, Motion, Rigid};
 use crate::lanes::{Element, run};
 
-pub(crate) use kernels::{Bound, Pinhole, Track};
+pub(crate) use kernels::{Bound, Pinhole, Track, TrackAlong};
 use kernels::{Project, ProjectMoved, Unproject};
 
 /// Runs an expression with `$bound` as the camera, its lens known at compile time.
@@ -92,4 +92,4 @@ impl Camera {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -5,7 +5,7 @@ use crate::camera::{Camera, Distortion, Model, Pixel, solve};
 use crate::frames::{self, Rigid, World};
 
 /// All models, and lenses that fold back inside the image.
-pub(super) fn lenses() -> Vec<(&'static str, Camera)> {
+pub(crate) fn lenses() -> Vec<(&'static str, Camera)> {
     let lenses: [(&str, [f64; 4], &[f64]); 8] = [
         ("pinhole", [665.1, 665.1, 511.5, 383.5], &[]),
         (

@@ -6,8 +6,7 @@ use crate::result::{AsideReason, DepthDoubtReason, PixelPart};
 fn rows(change: impl Fn(&str, usize, &mut Observation)) -> LabelSet {
     let mut rows = Vec::new();
     for point in labels(&flyer()).points() {
-        for (i, observation) in point.observations.iter().enumerate() {
-            let mut observation = *observation;
+        for (i, mut observation) in point.observations.iter().enumerate() {
             change(&point.name, i, &mut observation);
             rows.push(LabelRow { point: point.name.clone(), observation });
         }

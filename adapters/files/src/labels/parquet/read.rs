@@ -8,8 +8,7 @@ use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader, RowGroupMe
 use rayon::prelude::*;
 use vice_core::camera::Pixel;
 use vice_core::error::{DataError, DataResult, ErrorKind};
-use vice_core::label::{LabelSetBuilder, Observation, ObservationSource, Provenance};
-use vice_core::suspicion::Suspicion;
+use vice_core::label::{LabelSetBuilder, Marks, Observation, ObservationList, ObservationSource, Provenance};
 use vice_core::time::Stamp;
 
 use super::columns::{Column, Stored, Texts};
@@ -83,12 +82,7 @@ fn read_source(source: &Source, wanted: Option<&[String]>) -> DataResult<LabelFi
     (labels.dataset, labels.camera) = (said(DATASET), said(CAMERA));
     let mut read = LabelFile::of(labels);
     read.suspicions = into.lenient.suspicions("");
-    if !unknown.is_empty() {
-        read.suspicions.add(
-            Suspicion::new("label-columns", "", "columns that are not known are passed over")
-                .evidence(unknown.join(", ")),
-        );
-    }
+    read.suspicions.extend(unknown.unknown_said());
     Ok(read)
 }
 
@@ -145,19 +139,19 @@ struct Table {
 }
 
 impl Table {
-    /// By the names of the columns; and the names that are not known.
-    fn find(metadata: &ParquetMetaData) -> DataResult<(Self, Vec<String>)> {
+    /// By the names of the columns, as those of CSV.
+    fn find(metadata: &ParquetMetaData) -> DataResult<(Self, csv_columns::Columns)> {
         use Stored::{Flag, Real, Text, Whole};
         let described = metadata.file_metadata().schema_descr().columns();
         let names: Vec<String> = described.iter().map(|c| c.path().string()).collect();
         if let Some(name) = names.iter().enumerate().find(|(i, n)| names[..*i].contains(n)) {
             return Err(DataError::new(format!("the column {} appears twice", name.1)));
         }
-        let found = csv_columns::Columns::find(names.iter().map(String::as_str))?;
+        let mut found = csv_columns::Columns::find(names.iter().map(String::as_str))?;
         let column = |index: usize, allowed: &[Stored]| Column::new(index, described[index].clone(), allowed);
         let other =
             |index: Option<usize>, allowed: &[Stored]| index.map(|index| column(index, allowed)).transpose();
-        let mut unknown = found.unknown.clone();
+        let unknown = &mut found.unknown;
         unknown.retain(|name| name != ROW_NUMBER);
         let mut named = |name: &str, allowed: &[Stored]| {
             unknown.retain(|n| n != name);
@@ -185,7 +179,7 @@ impl Table {
             tracker_version,
             seeded,
         };
-        Ok((table, unknown))
+        Ok((table, found))
     }
 
     /// A row group as columns; without all but its length where it holds none of the wanted points.
@@ -215,7 +209,7 @@ impl Table {
         let (occluded, uncertain) = (marks(&self.occluded)?, marks(&self.uncertain)?);
         let seeded = marks(&self.seeded)?;
         let version = |c: &Column| c.wholes(source, group, rows, NO_VERSION);
-        Ok(Group {
+        let group = Group {
             rows,
             points: Some(points),
             stamps: self.stamp.wholes(source, group, rows, NO_STAMP)?,
@@ -230,7 +224,9 @@ impl Table {
             tracker_version: self.tracker_version.as_ref().map(version).transpose()?,
             seeded,
             wrong,
-        })
+            plain: None,
+        };
+        Ok(if self.unit == Some(TimeUnit::Nanos) { group.as_plain() } else { group })
     }
 }
 
@@ -252,6 +248,46 @@ struct Group {
     seeded: Option<Vec<bool>>,
     /// A row whose value is neither yes nor no, and its column.
     wrong: Option<(usize, String)>,
+    /// The labels of the one point that it holds, where there is nothing to be said of any of them.
+    plain: Option<(String, ObservationList)>,
+}
+
+impl Group {
+    /// With its columns as the labels of one point, where they are that and nothing in them asks for a closer look.
+    fn as_plain(mut self) -> Self {
+        let Some(Texts::One(name)) = &self.points else { return self };
+        let no_flags = self.flags.as_ref().is_none_or(|f| matches!(f, Texts::One(text) if text.is_empty()));
+        let source = match &self.sources {
+            None => Some(ObservationSource::default()),
+            Some(Texts::One(name)) => ObservationSource::from_name(name),
+            Some(Texts::Each(_)) => None,
+        };
+        let is_finite = |all: &[f64]| all.iter().all(|v| v.is_finite());
+        let plain = self.wrong.is_none()
+            && no_flags
+            && !name.is_empty()
+            && self.confidence.is_none()
+            && self.tracker_version.is_none()
+            && is_finite(&self.u_px)
+            && is_finite(&self.v_px)
+            && !self.stamps.contains(&NO_STAMP);
+        let Some(source) = source.filter(|_| plain) else { return self };
+        let name = name.clone();
+        let mut each =
+            Observation { source, ..Observation::manual(Stamp::from_nanos(0), Pixel::new(0.0, 0.0)) };
+        let is = |marks: &Option<Vec<bool>>, row: usize| marks.as_ref().is_some_and(|m| m[row]);
+        let marks = (0..self.rows).map(|row| {
+            each.keyframe = self.keyframe[row];
+            (each.occluded, each.uncertain) = (is(&self.occluded, row), is(&self.uncertain, row));
+            each.provenance.seeded = is(&self.seeded, row);
+            Marks::of(&each)
+        });
+        let marks = marks.collect();
+        let stamps = std::mem::take(&mut self.stamps).into_iter().map(Stamp::from_nanos).collect();
+        let pixels = [std::mem::take(&mut self.u_px), std::mem::take(&mut self.v_px)];
+        self.plain = ObservationList::from_columns(stamps, pixels, marks).map(|list| (name, list));
+        self
+    }
 }
 
 /// Where labels are taken in.
@@ -266,7 +302,13 @@ struct Into<'a> {
 }
 
 impl Into<'_> {
-    fn take(&mut self, table: &Table, group: Group) -> DataResult<()> {
+    fn take(&mut self, table: &Table, mut group: Group) -> DataResult<()> {
+        if let Some((name, list)) = group.plain.take() {
+            self.lenient.rows(group.rows as u64);
+            self.row += group.rows as u64;
+            self.kept += group.rows;
+            return self.labels.append(&name, list).map_err(label_error);
+        }
         let before = self.row;
         let at = |row: usize, problem: String| {
             DataError::new(format!("row {}: {problem}", before + row as u64 + 1))

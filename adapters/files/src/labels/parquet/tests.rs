@@ -177,9 +177,9 @@ fn tables_of_other_programs_are_labels_too() {
     .unwrap();
     let points = file.labels.points();
     assert_eq!(points.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), ["7", "12"]);
-    let o = points[0].observations[1];
+    let o = points[0].observations.get(1).unwrap();
     assert_eq!((o.stamp.as_nanos(), o.px, o.source.name()), (3_000_000, Pixel::new(1.5, 4.0), "auto"));
-    assert!(o.occluded && o.uncertain && !o.keyframe && points[0].observations[0].keyframe);
+    assert!(o.occluded && o.uncertain && !o.keyframe && points[0].observations.first().unwrap().keyframe);
     assert_eq!(file.suspicions.iter().map(|s| s.evidence.as_str()).collect::<Vec<_>>(), ["weight"]);
     // A row without a pixel holds no label.
     let file = read(&[

@@ -1,6 +1,7 @@
 //! Writing labels as Parquet, with fixed settings: the same labels are the same bytes everywhere.
 
 use std::io::Write;
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -12,7 +13,7 @@ use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{ColumnPath, Type};
 use vice_core::error::{DataError, DataResult};
-use vice_core::label::{LabelSet, Observation};
+use vice_core::label::{LabelSet, Observation, ObservationList};
 
 use super::{CAMERA, DATASET, SCHEMA};
 use crate::atomic::{self, Overwrite};
@@ -25,7 +26,7 @@ const GROUP_ROWS: usize = 1 << 14;
 const MOST_ROWS: usize = 1 << 20;
 
 /// Labels of a row group, by point.
-type Group<'a> = Vec<(&'a str, &'a [Observation])>;
+type Group<'a> = Vec<(&'a str, &'a ObservationList, Range<usize>)>;
 
 /// Writes all of the labels or nothing.
 ///
@@ -56,15 +57,17 @@ fn groups(labels: &LabelSet) -> Vec<Group<'_>> {
     // Rows of the last group, as long as more may come to it.
     let mut open = None;
     for point in labels.points() {
-        if point.observations.len() >= GROUP_ROWS {
-            groups.extend(point.observations.chunks(MOST_ROWS).map(|some| vec![(point.name.as_str(), some)]));
+        let (name, all, count) = (point.name.as_str(), &point.observations, point.observations.len());
+        if count >= GROUP_ROWS {
+            let parts = (0..count).step_by(MOST_ROWS).map(|from| from..count.min(from + MOST_ROWS));
+            groups.extend(parts.map(|part| vec![(name, all, part)]));
             open = None;
             continue;
         }
-        let rows = point.observations.len() + open.unwrap_or(0);
+        let rows = count + open.unwrap_or(0);
         match groups.last_mut().filter(|_| open.is_some()) {
-            Some(group) => group.push((&point.name, &point.observations)),
-            None => groups.push(vec![(&point.name, &point.observations)]),
+            Some(group) => group.push((name, all, 0..count)),
+            None => groups.push(vec![(name, all, 0..count)]),
         }
         open = (rows < GROUP_ROWS).then_some(rows);
     }
@@ -80,8 +83,9 @@ struct Columns {
 
 impl Columns {
     fn of(labels: &LabelSet) -> Self {
-        let any =
-            |has: fn(&Observation) -> bool| labels.points().iter().flat_map(|p| &p.observations).any(has);
+        let any = |has: fn(&Observation) -> bool| {
+            labels.points().iter().flat_map(|p| &p.observations).any(|o| has(&o))
+        };
         Self {
             confidence: any(|o| o.provenance.confidence.is_some()),
             tracker_version: any(|o| o.provenance.tracker_version.is_some()),
@@ -119,11 +123,11 @@ impl Columns {
         writer: &mut SerializedRowGroupWriter<'_, W>,
         group: &Group<'_>,
     ) -> Result<()> {
-        let points = group.iter().flat_map(|(name, all)| {
+        let points = group.iter().flat_map(|(name, _, part)| {
             let name = ByteArray::from(name.as_bytes().to_vec());
-            std::iter::repeat_n(name, all.len())
+            std::iter::repeat_n(name, part.len())
         });
-        let all = || group.iter().flat_map(|(_, all)| all.iter());
+        let all = || group.iter().flat_map(|(_, all, part)| all.some(part.clone()));
         column::<ByteArrayType, _>(writer, points)?;
         column::<Int64Type, _>(writer, all().map(|o| o.stamp.as_nanos()))?;
         column::<DoubleType, _>(writer, all().map(|o| o.px.u))?;
