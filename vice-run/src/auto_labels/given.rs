@@ -63,7 +63,7 @@ impl Givens {
 }
 
 fn in_window(point: &PointLabels, stamps: &[Stamp]) -> Given {
-    let place = |o: &vice_core::label::Observation| {
+    let place = |o: vice_core::label::Observation| {
         let position = stamps.binary_search(&o.stamp).ok()?;
         Some(GivenPlace { position, px: o.px, keyframe: o.keyframe, occluded: o.occluded })
     };

@@ -235,7 +235,7 @@ fn merged(
     let there = from.into_iter().flat_map(|g| g.labels.points()).flat_map(|p| {
         p.observations
             .iter()
-            .map(|o| LabelRow { point: p.name.clone(), observation: Observation { line: 0, ..*o } })
+            .map(|o| LabelRow { point: p.name.clone(), observation: Observation { line: 0, ..o } })
     });
     let mut labels = LabelSet::from_rows(there.chain(new))
         .map_err(|e| RunError::usage("from", "the labels do not fit together").because(e))?;
