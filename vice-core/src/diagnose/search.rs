@@ -220,7 +220,7 @@ fn again(work: &Work<'_, '_>, fits: Vec<Fit>, steps: usize) -> Vec<Fit> {
 fn same_sizes(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
     let best = best_of(&fits);
     let logs = work.sized(fits[best].clone(), 3).logs;
-    fits.into_par_iter().map(|fit| work.rescored(Fit { logs, ..fit })).collect()
+    work.sized_together(fits, &logs, |_| false)
 }
 
 /// With their own sizes, those that are close.
@@ -231,24 +231,21 @@ fn sized(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
     let limit = first.score - CLOSE;
     let left = |fit: &Fit| robust_cost(&fit.residuals_now());
     let left_by_first = left(&first);
-    let fits: Vec<Fit> = fits
-        .into_par_iter()
-        .enumerate()
-        .map(|(i, fit)| {
-            if i == best {
-                return first.clone();
-            }
-            // What leaves less than the best does may be far from it only for want of sizes as small as what it leaves.
-            let leaves_less = left(&fit) < SAME_VALLEY * left_by_first;
-            if leaves_less {
-                return work.sized(fit, SIZED_IN_FULL);
-            }
-            let fit = work.rescored(Fit { logs: first.logs, ..fit });
-            // Far from the best the best one's sizes are far from right.
-            let far = fit.score < limit - 3.0 * CLOSE;
-            if far || is_beside(&fit, first.solution.likelihood) { fit } else { work.sized(fit, 1) }
-        })
-        .collect();
+    // What leaves less than the best does may be far from it only for want of sizes as small as what it leaves.
+    let leaves_less = |(i, fit): &(usize, Fit)| *i != best && left(fit) < SAME_VALLEY * left_by_first;
+    let (less, others): (Vec<_>, Vec<_>) = fits.into_iter().enumerate().partition(leaves_less);
+    let less: Vec<(usize, Fit)> =
+        less.into_par_iter().map(|(i, fit)| (i, work.sized(fit, SIZED_IN_FULL))).collect();
+    let (places, others): (Vec<usize>, Vec<Fit>) = others.into_iter().filter(|(i, _)| *i != best).unzip();
+    let others = work.sized_together(others, &first.logs, |fit| {
+        // Far from the best the best one's sizes are far from right.
+        let far = fit.score < limit - 3.0 * CLOSE;
+        !far && !is_beside(fit, first.solution.likelihood)
+    });
+    let mut fits: Vec<(usize, Fit)> =
+        places.into_iter().zip(others).chain(less).chain([(best, first.clone())]).collect();
+    fits.sort_by_key(|(i, _)| *i);
+    let fits: Vec<Fit> = fits.into_iter().map(|(_, fit)| fit).collect();
     let limit = best_score(&fits) - CLOSE;
     fits.into_par_iter()
         .map(|fit| {
