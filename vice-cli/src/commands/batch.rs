@@ -6,8 +6,8 @@ use std::time::Instant;
 
 use vice_run::batch::scan::scan;
 use vice_run::batch::{Event, Keep, Manifest, Options, Shard, State, Store, Summary, plan, run as run_batch};
-use vice_run::files::tables::HAS_PARQUET;
 use vice_run::files::atomic::{self, Overwrite};
+use vice_run::files::tables::HAS_PARQUET;
 
 use super::batch_collect;
 use crate::signals;

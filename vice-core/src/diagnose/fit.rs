@@ -1,7 +1,7 @@
 //! A hypothesis fitted to the labels: a set of flaws, their values, the sizes of the noise, and how likely all of it is.
 
 use crate::parallel::*;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use super::DiagnoseError;
 use super::filter::{Jump, Shifts, Weights, Whitened, whiten};
@@ -9,39 +9,19 @@ use super::flaw::{Flaw, PARAMETERS};
 use super::geometry::Geometry;
 use super::motion::Motion;
 use super::noise::{Logs, NoiseModel};
-use super::normal::{Normal, Solution, WIDE_TIMES};
+use super::normal::{Normal, Solution};
 use super::scene::{LOST_PX, Residual, Scene};
 use super::theta::Theta;
 
-/// Step of a size's logarithm in differences.
-const SIZE_STEP: f64 = 0.1;
 /// Variance of a dead label over that of a usual one.
 const DEAD: f64 = 1e8;
 /// Three frames may have a jump if their squares exceed their number by so many deviations.
 const EXCESS: f64 = 3.8;
 /// ... in so many frames.
 const USUAL_FRAMES: f64 = 300.0;
-/// Longest step of a size's logarithm.
-const LONGEST_SIZE_STEP: f64 = 0.8;
 
 /// Fits whose passes are shared at a time: enough to save most of them, few enough for all threads and the memory.
-const TOGETHER: usize = 6;
-
-/// Scores of frames that differ by less than this share of their squares are all alike.
-const ALIKE: f64 = 0.1;
-
-/// The scores of frames, of which the squares tell how sharp the likelihood is. Where they are all alike, as those of the
-/// labels' noise are where all labels are far nearer than it, that is slope and no sharpness, and would shorten each step to
-/// an eighth: then only how they differ is left.
-fn unlike(scores: Vec<f64>) -> Vec<f64> {
-    let count = scores.len().max(1) as f64;
-    let mean = scores.iter().sum::<f64>() / count;
-    let squares: f64 = scores.iter().map(|s| s * s).sum();
-    match squares - count * mean * mean < ALIKE * squares {
-        true => scores.into_iter().map(|s| s - mean).collect(),
-        false => scores,
-    }
-}
+pub(super) const TOGETHER: usize = 6;
 
 /// What hypotheses are fitted to.
 pub(super) struct Work<'s, 'a> {
@@ -100,26 +80,6 @@ impl Fit {
         }
         residuals
     }
-}
-
-/// A fit before a step of its sizes.
-struct Base {
-    solution: Solution,
-    score: f64,
-    /// Log likelihood of each frame.
-    frames: Vec<f64>,
-}
-
-/// What a longer size changes: the score, and the likelihood of each frame, for a step of its logarithm.
-struct Moved {
-    slope: f64,
-    scores: Vec<f64>,
-}
-
-fn moved_by(logs: &Logs, size: usize) -> Logs {
-    let mut logs = *logs;
-    logs[size] += SIZE_STEP;
-    logs
 }
 
 pub(super) fn parameters_of(flaws: &[Flaw]) -> Vec<usize> {
@@ -198,7 +158,7 @@ impl Work<'_, '_> {
         (solution, whitened)
     }
 
-    fn score(&self, solution: &Solution, logs: &Logs, jumps: &[Jump]) -> f64 {
+    pub(super) fn score(&self, solution: &Solution, logs: &Logs, jumps: &[Jump]) -> f64 {
         solution.evidence + self.noise.prior(logs)
             - jumps.len() as f64 * jump_cost(self.geometry.frames.len())
     }
@@ -222,94 +182,13 @@ impl Work<'_, '_> {
         Fit { solution, score, ..fit }
     }
 
-    /// A hypothesis by Gauss-Newton's method from some values, at given sizes.
-    pub(super) fn newton(
-        &self,
-        flaws: &[Flaw],
-        start: &Theta,
-        logs: &Logs,
-        jumps: &[Jump],
-        steps: usize,
-    ) -> Result<Fit, DiagnoseError> {
-        let parameters = parameters_of(flaws);
-        let expected = expected_of(&parameters);
-        let mut theta = *start;
-        let mut best: Option<(f64, Fit)> = None;
-        for i in 0..=steps {
-            let evaluated = self
-                .residuals(&theta)
-                .and_then(|r| Ok((r, self.scene.columns(&theta, self.motion, &parameters)?)));
-            let (residuals, columns) = match (evaluated, &best) {
-                (Ok(evaluated), _) => evaluated,
-                (Err(error), None) => return Err(error),
-                (Err(_), Some(_)) => break,
-            };
-            let fit = Fit {
-                flaws: flaws.to_vec(),
-                parameters: parameters.clone(),
-                theta,
-                residuals,
-                columns,
-                logs: *logs,
-                jumps: jumps.to_vec(),
-                jump_gain: 0.0,
-                solution: Solution {
-                    step: DVector::zeros(0),
-                    covariance: DMatrix::zeros(0, 0),
-                    evidence: 0.0,
-                    likelihood: 0.0,
-                },
-                score: 0.0,
-            };
-            let whitened = self.whiten(&fit.residuals, &fit.columns, logs, jumps);
-            let all: Vec<usize> = (1..whitened.width).collect();
-            let normal = Normal::of(&whitened, &all);
-            let solution = normal.solve(&fit.linearised_at(), &expected);
-            let pull: f64 =
-                fit.linearised_at().iter().zip(&expected).map(|(x, s)| (x / (WIDE_TIMES * s)).powi(2)).sum();
-            let cost = normal.squares + pull;
-            let score = self.score(&solution, logs, jumps);
-            let fit = Fit { solution, score, ..fit };
-            match &mut best {
-                Some((least, kept)) if cost > *least => {
-                    // Too far: half of the way, from where it was best.
-                    for (parameter, step) in parameters.iter().zip(kept.solution.step.iter()) {
-                        let whole = kept.theta[*parameter] + step;
-                        let share =
-                            (theta[*parameter] - kept.theta[*parameter]) / (whole - kept.theta[*parameter]);
-                        let share = if share.is_finite() { 0.4 * share } else { 0.0 };
-                        theta[*parameter] = kept.theta[*parameter] + share * step;
-                    }
-                    continue;
-                }
-                _ => {}
-            }
-            let done = fit
-                .solution
-                .step
-                .iter()
-                .zip(&parameters)
-                .all(|(s, p)| s.abs() < 0.02 * PARAMETERS[*p].typical);
-            theta = fit.values();
-            let better = best.as_ref().is_none_or(|(least, _)| cost <= *least);
-            if better {
-                best = Some((cost, fit));
-            }
-            if done || i == steps {
-                break;
-            }
-        }
-        best.map(|(_, fit)| fit)
-            .ok_or_else(|| DiagnoseError::CannotEvaluate("the fit does not start".to_string()))
-    }
-
     /// The solutions of fits with the same sizes and jumps in one pass, with what `then` makes of each.
-    fn solve_all<T: Send>(
+    pub(super) fn solve_all<T: Send>(
         &self,
         fits: &[&Fit],
         logs: &Logs,
         jumps: &[Jump],
-        then: impl Fn(usize, Solution, &Whitened) -> T,
+        then: impl Fn(usize, &Normal, Solution, &Whitened) -> T,
     ) -> Vec<T> {
         let all: Vec<&[Residual]> = fits
             .iter()
@@ -324,161 +203,10 @@ impl Work<'_, '_> {
             let whitened = together.of_columns(&places);
             let columns: Vec<usize> = (1..whitened.width).collect();
             let normal = Normal::of(&whitened, &columns);
-            then(i, normal.solve(&fit.linearised_at(), &expected_of(&fit.parameters)), &whitened)
+            let solution = normal.solve(&fit.linearised_at(), &expected_of(&fit.parameters));
+            then(i, &normal, solution, &whitened)
         };
         fits.iter().enumerate().map(one).collect()
-    }
-
-    /// Fits with the outliers as they are now, and the same sizes for all of them; those that `wants` are then given sizes of
-    /// their own in one round. As [`Work::rescored`] and [`Work::sized`] one by one, but passes are shared.
-    pub(super) fn sized_together(
-        &self,
-        fits: Vec<Fit>,
-        logs: &Logs,
-        wants: impl Fn(&Fit) -> bool + Sync,
-    ) -> Vec<Fit> {
-        let alike = fits.windows(2).all(|pair| pair[0].jumps == pair[1].jumps);
-        let Some(jumps) = fits.first().map(|fit| fit.jumps.clone()).filter(|_| alike) else {
-            let one = |fit: Fit| {
-                let fit = self.rescored(Fit { logs: *logs, ..fit });
-                if wants(&fit) { self.sized(fit, 1) } else { fit }
-            };
-            return fits.into_par_iter().map(one).collect();
-        };
-        let some: Vec<&[Fit]> = fits.chunks(TOGETHER).collect();
-        let bases: Vec<Base> = some
-            .par_iter()
-            .map(|some| {
-                let some: Vec<&Fit> = some.iter().collect();
-                self.solve_all(&some, logs, &jumps, |_, solution, whitened| {
-                    self.base(solution, whitened, logs, &jumps)
-                })
-            })
-            .collect::<Vec<_>>()
-            .into_iter()
-            .flatten()
-            .collect();
-        let rescored: Vec<(Fit, Base)> = fits
-            .into_iter()
-            .zip(bases)
-            .map(|(fit, base)| {
-                (Fit { logs: *logs, solution: base.solution.clone(), score: base.score, ..fit }, base)
-            })
-            .collect();
-        let wanted: Vec<usize> = (0..rescored.len()).filter(|i| wants(&rescored[*i].0)).collect();
-        let parts: Vec<(usize, &[usize])> = self
-            .noise
-            .free()
-            .iter()
-            .flat_map(|size| wanted.chunks(TOGETHER).map(move |some| (*size, some)))
-            .collect();
-        let moved: Vec<Vec<(usize, usize, Moved)>> = parts
-            .into_par_iter()
-            .map(|(size, some)| {
-                let moved_logs = moved_by(logs, size);
-                let fits: Vec<&Fit> = some.iter().map(|i| &rescored[*i].0).collect();
-                self.solve_all(&fits, &moved_logs, &jumps, |i, solution, whitened| {
-                    let base = &rescored[some[i]].1;
-                    (some[i], size, self.moved(base, &solution, whitened, &moved_logs, &jumps))
-                })
-            })
-            .collect();
-        let mut by_fit: Vec<Vec<(usize, Moved)>> = rescored.iter().map(|_| Vec::new()).collect();
-        for (fit, size, moved) in moved.into_iter().flatten() {
-            by_fit[fit].push((size, moved));
-        }
-        let all: Vec<_> = rescored.into_iter().zip(by_fit).collect();
-        all.into_par_iter()
-            .map(|((fit, base), mut moved)| {
-                if moved.is_empty() {
-                    return fit;
-                }
-                moved.sort_by_key(|(size, _)| *size);
-                let moved: Vec<Moved> = moved.into_iter().map(|(_, moved)| moved).collect();
-                self.stepped(fit, base, &moved).0
-            })
-            .collect()
-    }
-
-    fn base(&self, solution: Solution, whitened: &Whitened, logs: &Logs, jumps: &[Jump]) -> Base {
-        let score = self.score(&solution, logs, jumps);
-        Base { frames: frame_likelihoods(whitened, &solution.step), score, solution }
-    }
-
-    /// What a longer size changes, at the values of the fit as it is.
-    fn moved(
-        &self,
-        base: &Base,
-        solution: &Solution,
-        whitened: &Whitened,
-        logs: &Logs,
-        jumps: &[Jump],
-    ) -> Moved {
-        let slope = (self.score(solution, logs, jumps) - base.score) / SIZE_STEP;
-        let scores: Vec<f64> = frame_likelihoods(whitened, &base.solution.step)
-            .iter()
-            .zip(&base.frames)
-            .map(|(a, b)| (a - b) / SIZE_STEP)
-            .collect();
-        Moved { slope, scores: unlike(scores) }
-    }
-
-    /// One step of the sizes; and the solution there, where it is a gain that is worth another.
-    fn stepped(&self, fit: Fit, base: Base, moved: &[Moved]) -> (Fit, Option<(Solution, Whitened)>) {
-        let free = self.noise.free();
-        let n = free.len();
-        let hessian = DMatrix::from_fn(n, n, |a, b| {
-            let sum: f64 = moved[a].scores.iter().zip(&moved[b].scores).map(|(x, y)| x * y).sum();
-            if a == b { sum + NoiseModel::deviation(free[a]).powi(-2) } else { sum }
-        });
-        let gradient = DVector::from_iterator(n, moved.iter().map(|m| m.slope));
-        let Some(chol) = hessian.cholesky() else { return (fit, None) };
-        let mut step = chol.solve(&gradient);
-        let longest = step.amax();
-        if longest > LONGEST_SIZE_STEP {
-            step *= LONGEST_SIZE_STEP / longest;
-        }
-        for _ in 0..3 {
-            let mut logs = fit.logs;
-            free.iter().zip(step.iter()).for_each(|(size, s)| {
-                logs[*size] = (logs[*size] + s).clamp(-3.0, 3.0);
-            });
-            let (solution, whitened) = self.solve(&fit, &logs, &fit.jumps);
-            let score = self.score(&solution, &logs, &fit.jumps);
-            if score > base.score {
-                let goes_on = (score - base.score >= 0.05).then(|| (solution.clone(), whitened));
-                return (Fit { logs, solution, score, ..fit }, goes_on);
-            }
-            step *= 0.35;
-        }
-        (Fit { solution: base.solution, score: base.score, ..fit }, None)
-    }
-
-    /// With sizes of noise of its own: the likeliest ones, by the scores of the frames.
-    pub(super) fn sized(&self, fit: Fit, rounds: usize) -> Fit {
-        let mut fit = fit;
-        let mut known: Option<(Solution, Whitened)> = None;
-        for _ in 0..rounds {
-            let (solution, whitened) =
-                known.take().unwrap_or_else(|| self.solve(&fit, &fit.logs, &fit.jumps));
-            let base = self.base(solution, &whitened, &fit.logs, &fit.jumps);
-            drop(whitened);
-            let moved: Vec<Moved> = self
-                .noise
-                .free()
-                .par_iter()
-                .map(|size| {
-                    let logs = moved_by(&fit.logs, *size);
-                    let (solution, whitened) = self.solve(&fit, &logs, &fit.jumps);
-                    self.moved(&base, &solution, &whitened, &logs, &fit.jumps)
-                })
-                .collect();
-            (fit, known) = self.stepped(fit, base, &moved);
-            if known.is_none() {
-                break;
-            }
-        }
-        fit
     }
 
     /// With the jumps that make it likelier by far.
@@ -537,7 +265,7 @@ impl Work<'_, '_> {
 }
 
 /// Log likelihood of each frame at a step.
-fn frame_likelihoods(whitened: &Whitened, step: &DVector<f64>) -> Vec<f64> {
+pub(super) fn frame_likelihoods(whitened: &Whitened, step: &DVector<f64>) -> Vec<f64> {
     frame_squares(whitened, step)
         .into_iter()
         .zip(&whitened.log_variances)

@@ -15,10 +15,10 @@ use super::results::{ResultRow, SCHEMA};
 use super::results_file::{results_csv, to_csv, write_parquet};
 use super::samples::{self, Samples};
 use super::store::{RowRecord, Store};
-use vice_files::tables::{self, Values};
 use crate::error::{RunError, RunResult};
 use crate::report::csv::cell;
 use crate::result;
+use vice_files::tables::{self, Values};
 
 /// What a batch has found so far.
 #[derive(Clone, Debug, Default)]

@@ -8,9 +8,9 @@ use serde_json::{Map, Value, json};
 use vice_core::error::{DataError, DataResult, ErrorKind};
 
 use super::results::{ResultRow, SCHEMA};
-use vice_files::tables::{self, Column, Values, is_parquet};
 use crate::error::RunResult;
 use crate::report::csv::{cell, finished};
+use vice_files::tables::{self, Column, Values, is_parquet};
 
 /// How a column is read off a row.
 #[derive(Clone, Copy)]

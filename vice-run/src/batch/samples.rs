@@ -13,9 +13,9 @@ use vice_core::time::Stamp;
 
 use super::key::Key;
 use super::store::Store;
-use vice_files::tables::{self, Column, Values};
 use crate::error::RunResult;
 use crate::result::ResultDocument;
+use vice_files::tables::{self, Column, Values};
 
 /// Rows that are held before they are written.
 const GROUP_ROWS: usize = 1 << 17;

@@ -195,16 +195,18 @@ fn sum_of_rows<S: Simd>(simd: S, row: &Row, p: &[f64], out: &mut [f64], n: usize
     let s = out.len();
     let (out, _) = S::as_mut_simd_f64s(out);
     let end = n.div_ceil(S::F64_LANES);
-    let mut at = 0;
-    while at < end {
+    let (mut from, mut times) = ([&[][..]; TERMS], [simd.splat_f64s(0.0); TERMS]);
+    for t in 0..TERMS {
+        let (i, factor) = row.terms[t];
+        let (of_row, _) = S::as_simd_f64s(&p[i * s..(i + 1) * s]);
+        (from[t], times[t]) = (&of_row[..end], simd.splat_f64s(factor));
+    }
+    for (at, out) in out[..end].iter_mut().enumerate() {
         let mut sum = simd.splat_f64s(0.0);
         for t in 0..TERMS {
-            let (i, times) = row.terms[t];
-            let (from, _) = S::as_simd_f64s(&p[i * s..(i + 1) * s]);
-            sum = simd.add_f64s(sum, simd.mul_f64s(simd.splat_f64s(times), from[at]));
+            sum = simd.add_f64s(sum, simd.mul_f64s(times[t], from[t][at]));
         }
-        out[at] = sum;
-        at += 1;
+        *out = sum;
     }
 }
 
