@@ -63,6 +63,20 @@ pub(super) struct Whitened {
     pub(super) shifts: Vec<Shift>,
 }
 
+impl Whitened {
+    /// The residuals and columns at some places, in this order, as if they had been made independent by themselves.
+    pub(super) fn of_columns(&self, places: &[usize]) -> Self {
+        let rows = self.rows.chunks_exact(self.width).flat_map(|row| places.iter().map(|place| row[*place]));
+        Self {
+            width: places.len(),
+            rows: rows.collect(),
+            frame_rows: self.frame_rows.clone(),
+            log_variances: self.log_variances.clone(),
+            shifts: Vec::new(),
+        }
+    }
+}
+
 /// Whose shifts are followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shifts {
@@ -243,15 +257,18 @@ impl<'p> Pass<'p> {
         self.state.look([m, m, m, rad, rad, rad]);
         self.out.frame_rows.push(self.out.rows.len() / self.out.width);
         let mut log_variances = 0.0;
-        for labels in frame.labels.chunks(AT_ONCE) {
-            log_variances += self.take(simd, f, labels);
+        let last = frame.labels.len().div_ceil(AT_ONCE);
+        for (chunk, labels) in frame.labels.chunks(AT_ONCE).enumerate() {
+            // More labels, and segments that begin, start from the pose with its jitter.
+            let looked_at = chunk + 1 < last || !frame.begins.is_empty();
+            log_variances += self.take(simd, f, labels, looked_at);
         }
         self.out.log_variances.push(log_variances);
     }
 
     /// Takes some labels in; the sum of the logarithms of their variances.
     #[inline(always)]
-    fn take<S: Simd>(&mut self, simd: S, f: usize, labels: &[usize]) -> f64 {
+    fn take<S: Simd>(&mut self, simd: S, f: usize, labels: &[usize], looked_at: bool) -> f64 {
         let mut rows = [Row { terms: [(0, 0.0); POSE + 4], variance: 0.0 }; 2 * AT_ONCE];
         let rows = &mut rows[..2 * labels.len()];
         let now = self.state.now;
@@ -273,7 +290,7 @@ impl<'p> Pass<'p> {
                 self.following.push(Following { of: *l, columns, until: f + AFTER_LABEL });
             }
         }
-        let log_variances = self.update.covariance(simd, &mut self.state, rows);
+        let log_variances = self.update.covariance(simd, &mut self.state, rows, looked_at);
         let (width, m) = (self.out.width, rows.len());
         let mut measured = [0.0; 2 * AT_ONCE];
         let first = self.out.rows.len();

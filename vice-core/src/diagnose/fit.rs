@@ -1,7 +1,7 @@
 //! A hypothesis fitted to the labels: a set of flaws, their values, the sizes of the noise, and how likely all of it is.
 
 use crate::parallel::*;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use super::DiagnoseError;
 use super::filter::{Jump, Shifts, Weights, Whitened, whiten};
@@ -9,36 +9,19 @@ use super::flaw::{Flaw, PARAMETERS};
 use super::geometry::Geometry;
 use super::motion::Motion;
 use super::noise::{Logs, NoiseModel};
-use super::normal::{Normal, Solution, WIDE_TIMES};
+use super::normal::{Normal, Solution};
 use super::scene::{LOST_PX, Residual, Scene};
 use super::theta::Theta;
 
-/// Step of a size's logarithm in differences.
-const SIZE_STEP: f64 = 0.1;
 /// Variance of a dead label over that of a usual one.
 const DEAD: f64 = 1e8;
 /// Three frames may have a jump if their squares exceed their number by so many deviations.
 const EXCESS: f64 = 3.8;
 /// ... in so many frames.
 const USUAL_FRAMES: f64 = 300.0;
-/// Longest step of a size's logarithm.
-const LONGEST_SIZE_STEP: f64 = 0.8;
 
-/// Scores of frames that differ by less than this share of their squares are all alike.
-const ALIKE: f64 = 0.1;
-
-/// The scores of frames, of which the squares tell how sharp the likelihood is. Where they are all alike, as those of the
-/// labels' noise are where all labels are far nearer than it, that is slope and no sharpness, and would shorten each step to
-/// an eighth: then only how they differ is left.
-fn unlike(scores: Vec<f64>) -> Vec<f64> {
-    let count = scores.len().max(1) as f64;
-    let mean = scores.iter().sum::<f64>() / count;
-    let squares: f64 = scores.iter().map(|s| s * s).sum();
-    match squares - count * mean * mean < ALIKE * squares {
-        true => scores.into_iter().map(|s| s - mean).collect(),
-        false => scores,
-    }
-}
+/// Fits whose passes are shared at a time: enough to save most of them, few enough for all threads and the memory.
+pub(super) const TOGETHER: usize = 6;
 
 /// What hypotheses are fitted to.
 pub(super) struct Work<'s, 'a> {
@@ -175,7 +158,7 @@ impl Work<'_, '_> {
         (solution, whitened)
     }
 
-    fn score(&self, solution: &Solution, logs: &Logs, jumps: &[Jump]) -> f64 {
+    pub(super) fn score(&self, solution: &Solution, logs: &Logs, jumps: &[Jump]) -> f64 {
         solution.evidence + self.noise.prior(logs)
             - jumps.len() as f64 * jump_cost(self.geometry.frames.len())
     }
@@ -199,146 +182,31 @@ impl Work<'_, '_> {
         Fit { solution, score, ..fit }
     }
 
-    /// A hypothesis by Gauss-Newton's method from some values, at given sizes.
-    pub(super) fn newton(
+    /// The solutions of fits with the same sizes and jumps in one pass, with what `then` makes of each.
+    pub(super) fn solve_all<T: Send>(
         &self,
-        flaws: &[Flaw],
-        start: &Theta,
+        fits: &[&Fit],
         logs: &Logs,
         jumps: &[Jump],
-        steps: usize,
-    ) -> Result<Fit, DiagnoseError> {
-        let parameters = parameters_of(flaws);
-        let expected = expected_of(&parameters);
-        let mut theta = *start;
-        let mut best: Option<(f64, Fit)> = None;
-        for i in 0..=steps {
-            let evaluated = self
-                .residuals(&theta)
-                .and_then(|r| Ok((r, self.scene.columns(&theta, self.motion, &parameters)?)));
-            let (residuals, columns) = match (evaluated, &best) {
-                (Ok(evaluated), _) => evaluated,
-                (Err(error), None) => return Err(error),
-                (Err(_), Some(_)) => break,
-            };
-            let fit = Fit {
-                flaws: flaws.to_vec(),
-                parameters: parameters.clone(),
-                theta,
-                residuals,
-                columns,
-                logs: *logs,
-                jumps: jumps.to_vec(),
-                jump_gain: 0.0,
-                solution: Solution {
-                    step: DVector::zeros(0),
-                    covariance: DMatrix::zeros(0, 0),
-                    evidence: 0.0,
-                    likelihood: 0.0,
-                },
-                score: 0.0,
-            };
-            let whitened = self.whiten(&fit.residuals, &fit.columns, logs, jumps);
-            let all: Vec<usize> = (1..whitened.width).collect();
-            let normal = Normal::of(&whitened, &all);
-            let solution = normal.solve(&fit.linearised_at(), &expected);
-            let pull: f64 =
-                fit.linearised_at().iter().zip(&expected).map(|(x, s)| (x / (WIDE_TIMES * s)).powi(2)).sum();
-            let cost = normal.squares + pull;
-            let score = self.score(&solution, logs, jumps);
-            let fit = Fit { solution, score, ..fit };
-            match &mut best {
-                Some((least, kept)) if cost > *least => {
-                    // Too far: half of the way, from where it was best.
-                    for (parameter, step) in parameters.iter().zip(kept.solution.step.iter()) {
-                        let whole = kept.theta[*parameter] + step;
-                        let share =
-                            (theta[*parameter] - kept.theta[*parameter]) / (whole - kept.theta[*parameter]);
-                        let share = if share.is_finite() { 0.4 * share } else { 0.0 };
-                        theta[*parameter] = kept.theta[*parameter] + share * step;
-                    }
-                    continue;
-                }
-                _ => {}
-            }
-            let done = fit
-                .solution
-                .step
-                .iter()
-                .zip(&parameters)
-                .all(|(s, p)| s.abs() < 0.02 * PARAMETERS[*p].typical);
-            theta = fit.values();
-            let better = best.as_ref().is_none_or(|(least, _)| cost <= *least);
-            if better {
-                best = Some((cost, fit));
-            }
-            if done || i == steps {
-                break;
-            }
-        }
-        best.map(|(_, fit)| fit)
-            .ok_or_else(|| DiagnoseError::CannotEvaluate("the fit does not start".to_string()))
-    }
-
-    /// With sizes of noise of its own: the likeliest ones, by the scores of the frames.
-    pub(super) fn sized(&self, fit: Fit, rounds: usize) -> Fit {
-        let mut fit = fit;
-        let free = self.noise.free();
-        for _ in 0..rounds {
-            let (solution, whitened) = self.solve(&fit, &fit.logs, &fit.jumps);
-            let now = self.score(&solution, &fit.logs, &fit.jumps);
-            let frames = frame_likelihoods(&whitened, &solution.step);
-            let moved: Vec<(f64, Vec<f64>)> = free
-                .par_iter()
-                .map(|size| {
-                    let mut logs = fit.logs;
-                    logs[*size] += SIZE_STEP;
-                    let (other, whitened) = self.solve(&fit, &logs, &fit.jumps);
-                    let slope = (self.score(&other, &logs, &fit.jumps) - now) / SIZE_STEP;
-                    let scores: Vec<f64> = frame_likelihoods(&whitened, &solution.step)
-                        .iter()
-                        .zip(&frames)
-                        .map(|(a, b)| (a - b) / SIZE_STEP)
-                        .collect();
-                    (slope, unlike(scores))
-                })
-                .collect();
-            let n = free.len();
-            let hessian = DMatrix::from_fn(n, n, |a, b| {
-                let sum: f64 = moved[a].1.iter().zip(&moved[b].1).map(|(x, y)| x * y).sum();
-                if a == b { sum + NoiseModel::deviation(free[a]).powi(-2) } else { sum }
-            });
-            let gradient = DVector::from_iterator(n, moved.iter().map(|m| m.0));
-            let Some(chol) = hessian.cholesky() else { break };
-            let mut step = chol.solve(&gradient);
-            let longest = step.amax();
-            if longest > LONGEST_SIZE_STEP {
-                step *= LONGEST_SIZE_STEP / longest;
-            }
-            let mut found = None;
-            for _ in 0..3 {
-                let mut logs = fit.logs;
-                free.iter().zip(step.iter()).for_each(|(size, s)| {
-                    logs[*size] = (logs[*size] + s).clamp(-3.0, 3.0);
-                });
-                let (other, _) = self.solve(&fit, &logs, &fit.jumps);
-                let score = self.score(&other, &logs, &fit.jumps);
-                if score > now {
-                    found = Some((logs, other, score));
-                    break;
-                }
-                step *= 0.35;
-            }
-            let Some((logs, solution, score)) = found else {
-                fit = Fit { solution, score: now, ..fit };
-                break;
-            };
-            fit = Fit { logs, solution, score, ..fit };
-            if score - now < 0.05 {
-                break;
-            }
-        }
-        fit
+        then: impl Fn(usize, &Normal, Solution, &Whitened) -> T,
+    ) -> Vec<T> {
+        let all: Vec<&[Residual]> = fits
+            .iter()
+            .flat_map(|fit| std::iter::once(&fit.residuals).chain(&fit.columns).map(Vec::as_slice))
+            .collect();
+        let together =
+            whiten(&self.geometry, &all, &self.noise.sizes(logs), &self.weights, jumps, Shifts::Nobodys);
+        let mut first = 0;
+        let one = |(i, fit): (usize, &&Fit)| {
+            let places: Vec<usize> = (first..=first + fit.columns.len()).collect();
+            first += places.len();
+            let whitened = together.of_columns(&places);
+            let columns: Vec<usize> = (1..whitened.width).collect();
+            let normal = Normal::of(&whitened, &columns);
+            let solution = normal.solve(&fit.linearised_at(), &expected_of(&fit.parameters));
+            then(i, &normal, solution, &whitened)
+        };
+        fits.iter().enumerate().map(one).collect()
     }
 
     /// With the jumps that make it likelier by far.
@@ -397,7 +265,7 @@ impl Work<'_, '_> {
 }
 
 /// Log likelihood of each frame at a step.
-fn frame_likelihoods(whitened: &Whitened, step: &DVector<f64>) -> Vec<f64> {
+pub(super) fn frame_likelihoods(whitened: &Whitened, step: &DVector<f64>) -> Vec<f64> {
     frame_squares(whitened, step)
         .into_iter()
         .zip(&whitened.log_variances)

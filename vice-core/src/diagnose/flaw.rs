@@ -228,6 +228,11 @@ impl Flaw {
         )
     }
 
+    /// Whether it moves the poses of the stream.
+    pub(super) const fn of_the_motion(self) -> bool {
+        !self.of_the_camera() && !matches!(self, Self::RollingShutter)
+    }
+
     /// Labels that would show it, or tell it from others.
     pub const fn labels_that_help(self) -> &'static str {
         match self {

@@ -18,7 +18,7 @@ use crate::dataset::Floor;
 use crate::depth::{DepthSource, Keyframe};
 use crate::evaluate::trial::Trial;
 use crate::evaluate::{EvaluateError, Evaluation};
-use crate::frames::BodyFromCamera;
+use crate::frames::{BodyFromCamera, WorldFromBody};
 use crate::time::Stamp;
 
 /// Where a label's key point is carried minus the label, pixels.
@@ -31,6 +31,9 @@ type Depths = Arc<Vec<Option<f64>>>;
 
 /// Answers of a depth source that are kept.
 const KEPT_DEPTHS: usize = 96;
+
+/// Poses at the frames that are kept.
+const KEPT_POSES: usize = 6;
 
 /// A frame with a key frame or a label.
 #[derive(Clone, Debug)]
@@ -79,6 +82,8 @@ pub(super) struct Scene<'a> {
     /// Whether the depth does not depend on where the camera is thought to be.
     pub(super) fixed_depth: bool,
     kept: Mutex<HashMap<Vec<u64>, Depths>>,
+    /// Poses at the frames that were read last: most flaws are not the motion's.
+    kept_poses: Mutex<Vec<(Vec<u64>, Arc<Vec<WorldFromBody>>)>>,
 }
 
 /// When a row is exposed, as a share of the read-out time from the middle row.
@@ -145,6 +150,7 @@ impl<'a> Scene<'a> {
             roughness: source.roughness(),
             fixed_depth: false,
             kept: Mutex::default(),
+            kept_poses: Mutex::default(),
         };
         scene.fixed_depth = scene.roughness > 0.0 || scene.depth_is_fixed(evaluation, stream)?;
         Ok(scene)
@@ -204,6 +210,30 @@ impl<'a> Scene<'a> {
         let both: Vec<(f64, f64)> =
             as_is.iter().zip(&moved).filter_map(|(a, b)| Some(((*a)?, (*b)?))).collect();
         Ok(!both.is_empty() && both.iter().all(|(a, b)| (a - b).abs() <= 1e-9 * a.abs()))
+    }
+
+    /// Poses at the frames.
+    pub(super) fn poses(
+        &self,
+        theta: &Theta,
+        reader: &Reader<'_>,
+        motion: &Motion<'_>,
+    ) -> Arc<Vec<WorldFromBody>> {
+        let mut key = vec![motion.id];
+        for flaw in Flaw::ALL.iter().filter(|f| f.of_the_motion()) {
+            key.extend(theta.of(*flaw).iter().map(|v| (v + 0.0).to_bits()));
+        }
+        let kept = || self.kept_poses.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, poses)) = kept().iter().find(|(k, _)| *k == key) {
+            return Arc::clone(poses);
+        }
+        let poses: Arc<Vec<WorldFromBody>> = Arc::new(self.frames.iter().map(|f| reader.at(f.t_s)).collect());
+        let mut kept = kept();
+        if kept.len() >= KEPT_POSES {
+            kept.remove(0);
+        }
+        kept.push((key, Arc::clone(&poses)));
+        poses
     }
 
     /// Depths of the segments' key points.

@@ -7,6 +7,7 @@ use super::filter::Weights;
 use super::fit::{Fit, Work, expected_of, parameters_of};
 use super::flaw::Flaw;
 use super::gross::independent;
+use super::newton::Way;
 use super::noise::Logs;
 use super::normal::Normal;
 use super::outliers;
@@ -138,13 +139,11 @@ fn best_score(fits: &[Fit]) -> f64 {
 fn singles(work: &Work<'_, '_>, flaws: &[Flaw], logs: &Logs) -> Result<(Vec<Fit>, Refused), DiagnoseError> {
     let zero = Theta::zero();
     let sets: Vec<Vec<Flaw>> = std::iter::once(vec![]).chain(flaws.iter().map(|f| vec![*f])).collect();
-    let first: Vec<Result<Fit, DiagnoseError>> = sets
-        .par_iter()
-        .map(|set| {
-            let from = set.first().map_or(zero, |flaw| start(work, *flaw, &zero));
-            work.newton(set, &from, logs, &[], 4)
-        })
-        .collect();
+    let ways = sets.par_iter().map(|set| {
+        let from = set.first().map_or(zero, |flaw| start(work, *flaw, &zero));
+        Way::new(set, &from, logs, &[])
+    });
+    let first = work.newton_all(ways.collect(), 4);
     let (mut fits, mut refused) = (Vec::new(), Vec::new());
     for (set, fit) in sets.iter().zip(first) {
         match (fit, set.first()) {
@@ -202,25 +201,23 @@ fn shared_outliers(work: &Work<'_, '_>, fits: &[Fit], nearest: &[Flaw]) -> Weigh
 /// Fits them again from where they are, with the outliers as they are now.
 fn again(work: &Work<'_, '_>, fits: Vec<Fit>, steps: usize) -> Vec<Fit> {
     let close = best_score(&fits) - 20.0 * CLOSE;
-    fits.into_par_iter()
-        .map(|fit| {
-            if fit.score < close {
-                return fit;
-            }
-            let from = fit.values();
-            match work.newton(&fit.flaws, &from, &fit.logs, &fit.jumps, steps) {
-                Ok(new) => Fit { jump_gain: fit.jump_gain, ..new },
-                Err(_) => fit,
-            }
-        })
-        .collect()
+    let near: Vec<usize> = (0..fits.len()).filter(|i| fits[*i].score >= close).collect();
+    let way = |i: &usize| Way::new(&fits[*i].flaws, &fits[*i].values(), &fits[*i].logs, &fits[*i].jumps);
+    let found = work.newton_all(near.iter().map(way).collect(), steps);
+    let mut fits = fits;
+    for (i, new) in near.into_iter().zip(found) {
+        if let Ok(new) = new {
+            fits[i] = Fit { jump_gain: fits[i].jump_gain, ..new };
+        }
+    }
+    fits
 }
 
 /// All of them with the sizes of the best one.
 fn same_sizes(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
     let best = best_of(&fits);
     let logs = work.sized(fits[best].clone(), 3).logs;
-    fits.into_par_iter().map(|fit| work.rescored(Fit { logs, ..fit })).collect()
+    work.sized_together(fits, &logs, |_| false)
 }
 
 /// With their own sizes, those that are close.
@@ -231,24 +228,21 @@ fn sized(work: &Work<'_, '_>, fits: Vec<Fit>) -> Vec<Fit> {
     let limit = first.score - CLOSE;
     let left = |fit: &Fit| robust_cost(&fit.residuals_now());
     let left_by_first = left(&first);
-    let fits: Vec<Fit> = fits
-        .into_par_iter()
-        .enumerate()
-        .map(|(i, fit)| {
-            if i == best {
-                return first.clone();
-            }
-            // What leaves less than the best does may be far from it only for want of sizes as small as what it leaves.
-            let leaves_less = left(&fit) < SAME_VALLEY * left_by_first;
-            if leaves_less {
-                return work.sized(fit, SIZED_IN_FULL);
-            }
-            let fit = work.rescored(Fit { logs: first.logs, ..fit });
-            // Far from the best the best one's sizes are far from right.
-            let far = fit.score < limit - 3.0 * CLOSE;
-            if far || is_beside(&fit, first.solution.likelihood) { fit } else { work.sized(fit, 1) }
-        })
-        .collect();
+    // What leaves less than the best does may be far from it only for want of sizes as small as what it leaves.
+    let leaves_less = |(i, fit): &(usize, Fit)| *i != best && left(fit) < SAME_VALLEY * left_by_first;
+    let (less, others): (Vec<_>, Vec<_>) = fits.into_iter().enumerate().partition(leaves_less);
+    let less: Vec<(usize, Fit)> =
+        less.into_par_iter().map(|(i, fit)| (i, work.sized(fit, SIZED_IN_FULL))).collect();
+    let (places, others): (Vec<usize>, Vec<Fit>) = others.into_iter().filter(|(i, _)| *i != best).unzip();
+    let others = work.sized_together(others, &first.logs, |fit| {
+        // Far from the best the best one's sizes are far from right.
+        let far = fit.score < limit - 3.0 * CLOSE;
+        !far && !is_beside(fit, first.solution.likelihood)
+    });
+    let mut fits: Vec<(usize, Fit)> =
+        places.into_iter().zip(others).chain(less).chain([(best, first.clone())]).collect();
+    fits.sort_by_key(|(i, _)| *i);
+    let fits: Vec<Fit> = fits.into_iter().map(|(_, fit)| fit).collect();
     let limit = best_score(&fits) - CLOSE;
     fits.into_par_iter()
         .map(|fit| {

@@ -3,15 +3,18 @@
 //! A flaw is injected into what is in use, both ways round, and the error is scored as an evaluation would. The
 //! document is `vice.sensitivity/1`.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use serde::{Deserialize, Serialize};
 
-use super::fit::Work;
+use super::fit::{Work, parameters_of};
 use super::flaw::{Flaw, PARAMETERS};
 use super::noise::NoiseModel;
 use super::outliers;
 use super::report::labels_part;
 use super::theta::Theta;
 use super::{DiagnoseError, Diagnosis, LabelsPart, Prepared, flaws_of};
+use crate::parallel::*;
 
 /// The schema's name and version.
 pub const SENSITIVITY_SCHEMA: &str = "vice.sensitivity/1";
@@ -95,24 +98,35 @@ pub fn sensitivity(
     let none = work.sized(none, 3);
     let labels = labels_part(&prepared, &work);
     let now_px = work.rms(&base);
-    let mut curves = Vec::new();
-    for (done, flaw) in flaws.iter().enumerate() {
-        for parameter in flaw.solved() {
-            let columns = scene.columns(&zero, motion, &[parameter])?;
-            let whitened = work.whiten(&base, &columns, &none.logs, &none.jumps);
-            let squares: f64 = whitened.rows.chunks_exact(2).map(|row| row[1] * row[1]).sum();
-            let found_from = DETECTED * INFLATED / squares.max(f64::MIN_POSITIVE).sqrt();
+    // One pass for all of them.
+    let parameters = parameters_of(&flaws);
+    let columns = scene.columns(&zero, motion, &parameters)?;
+    let whitened = work.whiten(&base, &columns, &none.logs, &none.jumps);
+    drop(columns);
+    let squares = |place: usize| -> f64 {
+        whitened.rows.chunks_exact(whitened.width).map(|row| row[1 + place] * row[1 + place]).sum()
+    };
+    let done = AtomicUsize::new(0);
+    let of_flaw = |flaw: &Flaw| -> Result<Vec<Curve>, DiagnoseError> {
+        let curves = flaw.solved().map(|parameter| {
+            let place = parameters.iter().position(|p| *p == parameter).unwrap_or_default();
+            let found_from = DETECTED * INFLATED / squares(place).max(f64::MIN_POSITIVE).sqrt();
             let points = curve(&work, parameter, now_px)?;
-            curves.push(Curve {
+            Ok(Curve {
                 flaw: *flaw,
                 parameter: PARAMETERS[parameter].name.to_string(),
                 seen_from: seen_from(now_px, &points),
                 found_from: (found_from < PARAMETERS[parameter].plausible).then_some(found_from),
                 points,
-            });
-        }
-        progress(done + 1, flaws.len());
-    }
+            })
+        });
+        let curves = curves.collect::<Result<Vec<_>, DiagnoseError>>();
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, flaws.len());
+        curves
+    };
+    let curves: Vec<Result<Vec<Curve>, DiagnoseError>> = flaws.par_iter().map(of_flaw).collect();
+    let curves: Vec<Curve> =
+        curves.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
     Ok(SensitivityDocument {
         schema: SENSITIVITY_SCHEMA.to_string(),
         vice_version: env!("CARGO_PKG_VERSION").to_string(),

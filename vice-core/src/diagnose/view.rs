@@ -1,5 +1,7 @@
 //! The scene as it is with some flaws taken out: where points are, and how their pixels answer.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector2, Vector3};
 
 use super::DiagnoseError;
@@ -18,8 +20,10 @@ pub(super) struct View<'s, 'a> {
     pub(super) camera: Camera,
     pub(super) reader: Reader<'s>,
     pub(super) readout_s: f64,
-    pub(super) at_frames: Vec<WorldFromBody>,
+    pub(super) at_frames: Arc<Vec<WorldFromBody>>,
     pub(super) cameras: Vec<Option<BodyFromCamera>>,
+    /// The cameras in the world, where all rows are exposed at once.
+    placed: Vec<Option<WorldFromCamera>>,
     /// Key points in the world; none without depth.
     pub(super) points: Vec<Option<Point3<f64>>>,
 }
@@ -45,10 +49,16 @@ impl<'a> Scene<'a> {
         let reader = motion.reader(theta).map_err(|e| refused(e.to_string()))?;
         let depths = self.depths(theta, &reader, motion)?;
         let readout_s = theta.of(Flaw::RollingShutter)[0];
-        let at_frames: Vec<WorldFromBody> = self.frames.iter().map(|f| reader.at(f.t_s)).collect();
+        let at_frames = self.poses(theta, &reader, motion);
         let cameras: Vec<Option<BodyFromCamera>> =
             self.frames.iter().map(|f| f.body_from_camera.map(|c| theta.correct_extrinsics(&c))).collect();
-        let mut view = View { scene: self, camera, reader, readout_s, at_frames, cameras, points: vec![] };
+        let place = |(body, camera): (&WorldFromBody, &Option<BodyFromCamera>)| camera.map(|c| *body * c);
+        let placed = match readout_s == 0.0 {
+            true => at_frames.iter().zip(&cameras).map(place).collect(),
+            false => vec![],
+        };
+        let mut view =
+            View { scene: self, camera, reader, readout_s, at_frames, cameras, placed, points: vec![] };
         view.points = self
             .segments
             .iter()
@@ -66,13 +76,12 @@ impl<'a> Scene<'a> {
 impl View<'_, '_> {
     /// The camera when the row of a pixel is exposed.
     pub(super) fn world_from_camera(&self, frame: usize, px: Pixel) -> Option<WorldFromCamera> {
+        if self.readout_s == 0.0 {
+            return self.placed[frame];
+        }
         let body_from_camera = self.cameras[frame]?;
-        let body = if self.readout_s == 0.0 {
-            self.at_frames[frame]
-        } else {
-            self.reader.at(self.scene.frames[frame].t_s + self.readout_s * row_share(&self.camera, px))
-        };
-        Some(body * body_from_camera)
+        let t_s = self.scene.frames[frame].t_s + self.readout_s * row_share(&self.camera, px);
+        Some(self.reader.at(t_s) * body_from_camera)
     }
 
     pub(super) fn extrinsics(&self, frame: usize) -> Option<BodyFromCamera> {

@@ -322,7 +322,7 @@ impl Plan {
                 }
             }
             Kind::Point | Kind::Other => {
-                text().filter(|t| !t.contains(['"', '\r', '\u{feff}']))?;
+                text().filter(|t| !t.contains(['"', '\r']) && !t.starts_with('\u{feff}'))?;
             }
         }
         Some(())
@@ -349,8 +349,10 @@ impl Points {
                 match self.by_name.get(name) {
                     Some(index) => *index,
                     None => {
-                        let odd =
-                            name.is_empty() || name.trim() != name || name.contains(['"', '\r', '\u{feff}']);
+                        let odd = name.is_empty()
+                            || name.trim() != name
+                            || name.contains(['"', '\r'])
+                            || name.starts_with('\u{feff}');
                         if odd {
                             return None;
                         }

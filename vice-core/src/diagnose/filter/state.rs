@@ -95,7 +95,11 @@ impl State {
         after[..POSE * s].copy_from_slice(&before[..POSE * s]);
         for row in self.p.chunks_exact_mut(s).take(self.n) {
             let (before, after) = row.split_at_mut(now);
-            after[..POSE].copy_from_slice(&before[..POSE]);
+            // One by one: a copy of so few is no call.
+            let (before, after) = (&before[..POSE], &mut after[..POSE]);
+            for i in 0..POSE {
+                after[i] = before[i];
+            }
         }
         for i in 0..POSE {
             self.widen(now + i, jitter[i] * jitter[i]);

@@ -1,6 +1,8 @@
 //! Labels of one frame taken in together: the rows that they add, by Cholesky's decomposition of their covariance. The same
 //! numbers as one by one, with each number of the covariance read and written once.
 
+use std::ops::Range;
+
 use pulp::Simd;
 
 use super::state::{POSE, State};
@@ -24,6 +26,8 @@ pub(super) struct Update {
     stride: usize,
     /// Covariance of each row with the state, then the same made independent.
     rows: Vec<f64>,
+    /// The first of these, number by number of the state.
+    turned: Vec<[f64; ROWS]>,
     lower: [[f64; ROWS]; ROWS],
     /// One over the diagonal of `lower`.
     inverse: [f64; ROWS],
@@ -31,23 +35,42 @@ pub(super) struct Update {
 
 impl Update {
     pub(super) fn new(stride: usize) -> Self {
-        Self { stride, rows: vec![0.0; ROWS * stride], lower: [[0.0; ROWS]; ROWS], inverse: [0.0; ROWS] }
+        Self {
+            stride,
+            rows: vec![0.0; ROWS * stride],
+            turned: vec![[0.0; ROWS]; stride],
+            lower: [[0.0; ROWS]; ROWS],
+            inverse: [0.0; ROWS],
+        }
     }
 
-    /// Takes rows into the covariance; the sum of the logarithms of their variances, each given those before it.
+    /// Takes rows into the covariance; the sum of the logarithms of their variances, each given those before it. The pose
+    /// with its jitter is left as it was unless it is `looked_at` once more before the next frame.
     #[inline(always)]
-    pub(super) fn covariance<S: Simd>(&mut self, simd: S, state: &mut State, rows: &[Row]) -> f64 {
+    pub(super) fn covariance<S: Simd>(
+        &mut self,
+        simd: S,
+        state: &mut State,
+        rows: &[Row],
+        looked_at: bool,
+    ) -> f64 {
         let (s, n) = (self.stride, state.n);
         let m = rows.len();
         for (row, out) in rows.iter().zip(self.rows.chunks_exact_mut(s)) {
             sum_of_rows(simd, row, &state.p, out, n);
         }
+        for k in 0..n {
+            for b in 0..m {
+                self.turned[k][b] = self.rows[b * s + k];
+            }
+        }
         for a in 0..m {
-            // Sums that do not wait for each other.
+            // Sums that do not wait for each other; those beyond `a` are not used.
             let mut sums = [0.0; ROWS];
             for (i, times) in rows[a].terms {
-                for b in 0..=a {
-                    sums[b] += times * self.rows[b * s + i];
+                let with = &self.turned[i];
+                for b in 0..ROWS {
+                    sums[b] += times * with[b];
                 }
             }
             sums[a] += rows[a].variance;
@@ -83,16 +106,20 @@ impl Update {
             }
             rest[n..s].fill(0.0);
         }
-        self.subtract(simd, &mut state.p, n, m);
+        let left = if looked_at { 0..0 } else { state.now..state.now + POSE };
+        self.subtract(simd, &mut state.p, n, m, left);
         log_variances
     }
 
-    /// `p -= rowsᵀ · rows`, two rows of the covariance and some registers at a time.
+    /// `p -= rowsᵀ · rows`, two rows of the covariance and some registers at a time; rows in `left` need not be.
     #[inline(always)]
-    fn subtract<S: Simd>(&self, simd: S, p: &mut [f64], n: usize, m: usize) {
+    fn subtract<S: Simd>(&self, simd: S, p: &mut [f64], n: usize, m: usize, left: Range<usize>) {
         let s = self.stride;
         let end = n.div_ceil(S::F64_LANES);
         for (k, pair) in p.chunks_exact_mut(2 * s).take(n.div_ceil(2)).enumerate() {
+            if left.start <= 2 * k && 2 * k + 1 < left.end {
+                continue;
+            }
             let (first, second) = pair.split_at_mut(s);
             let (first, _) = S::as_mut_simd_f64s(first);
             let (second, _) = S::as_mut_simd_f64s(second);
@@ -119,8 +146,12 @@ impl Update {
         second: &mut [S::f64s],
     ) {
         let (mut one, mut two) = ([simd.splat_f64s(0.0); N], [simd.splat_f64s(0.0); N]);
-        one.copy_from_slice(&first[at..at + N]);
-        two.copy_from_slice(&second[at..at + N]);
+        // One by one: copies of slices would go through memory.
+        let (first, second) = (&mut first[at..at + N], &mut second[at..at + N]);
+        for i in 0..N {
+            one[i] = first[i];
+            two[i] = second[i];
+        }
         for row in self.rows.chunks_exact(self.stride).take(m) {
             let (a, b) = (simd.splat_f64s(row[2 * k]), simd.splat_f64s(row[2 * k + 1]));
             let (row, _) = S::as_simd_f64s(row);
@@ -130,8 +161,10 @@ impl Update {
                 two[i] = simd.sub_f64s(two[i], simd.mul_f64s(b, with[i]));
             }
         }
-        first[at..at + N].copy_from_slice(&one);
-        second[at..at + N].copy_from_slice(&two);
+        for i in 0..N {
+            first[i] = one[i];
+            second[i] = two[i];
+        }
     }
 
     /// Takes the measured rows of one column into its mean; they become independent, of unit variance.
@@ -162,16 +195,18 @@ fn sum_of_rows<S: Simd>(simd: S, row: &Row, p: &[f64], out: &mut [f64], n: usize
     let s = out.len();
     let (out, _) = S::as_mut_simd_f64s(out);
     let end = n.div_ceil(S::F64_LANES);
-    let mut at = 0;
-    while at < end {
+    let (mut from, mut times) = ([&[][..]; TERMS], [simd.splat_f64s(0.0); TERMS]);
+    for t in 0..TERMS {
+        let (i, factor) = row.terms[t];
+        let (of_row, _) = S::as_simd_f64s(&p[i * s..(i + 1) * s]);
+        (from[t], times[t]) = (&of_row[..end], simd.splat_f64s(factor));
+    }
+    for (at, out) in out[..end].iter_mut().enumerate() {
         let mut sum = simd.splat_f64s(0.0);
         for t in 0..TERMS {
-            let (i, times) = row.terms[t];
-            let (from, _) = S::as_simd_f64s(&p[i * s..(i + 1) * s]);
-            sum = simd.add_f64s(sum, simd.mul_f64s(simd.splat_f64s(times), from[at]));
+            sum = simd.add_f64s(sum, simd.mul_f64s(times[t], from[t][at]));
         }
-        out[at] = sum;
-        at += 1;
+        *out = sum;
     }
 }
 
