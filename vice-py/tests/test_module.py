@@ -21,7 +21,7 @@ from conftest import program
 FUNCTIONS = {
     "trajectory": ["trajectory.compare", "trajectory.ape", "trajectory.rpe"],
     "floor": ["fit_floor"],
-    "labels": ["convert_labels", "detect_labels", "track_labels"],
+    "labels": ["compare_labels", "convert_labels", "detect_labels", "track_labels"],
     "plugin": ["check_format", "new_plugin"],
     "depth": ["depth", "depth_compare"],
     "batch": ["batch", "collect", "scan", "ray.run"],

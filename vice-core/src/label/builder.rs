@@ -59,6 +59,6 @@ impl LabelSetBuilder {
                 return Err(LabelError::Duplicate { point, stamp, line });
             }
         }
-        Ok(LabelSet { points, dataset: None, camera: None })
+        Ok(LabelSet { points, ..LabelSet::default() })
     }
 }

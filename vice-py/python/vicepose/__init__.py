@@ -35,6 +35,7 @@ from ._api import (
 from ._commands import (
     annotate,
     bench,
+    compare_labels,
     convert,
     convert_labels,
     depth,
@@ -113,6 +114,7 @@ __all__ = [
     "check_format",
     "collect",
     "compare",
+    "compare_labels",
     "convert",
     "convert_labels",
     "demo",
