@@ -80,6 +80,9 @@ pub(crate) enum Found {
     Nothing,
 }
 
+/// A step of a grid differs from the one before it by less, as a share of it.
+const EVEN: f64 = 0.35;
+
 /// Position in the grid, in steps from where the walk began.
 type Cell = (i32, i32);
 /// Corners by their position.
@@ -174,8 +177,8 @@ fn fit(smooth: &Gray, mut grid: Grid, size: BoardSize) -> Found {
         return other_size(&grid);
     };
     let wanted = size.columns * size.rows;
-    let outside = grid.len() - inside;
-    if inside * 2 < wanted || outside * 10 > wanted {
+    // What hangs on at some places is the surroundings; a side that goes on is a larger board.
+    if inside * 2 < wanted || goes_on(&grid, corner, shape) {
         return other_size(&grid);
     }
     grid.retain(|cell, _| in_window(*cell, corner, shape));
@@ -216,6 +219,29 @@ fn window(grid: &Grid, shape: (i32, i32)) -> Option<(usize, Cell, (i32, i32))> {
         }
     }
     best
+}
+
+/// Whether the grid goes on beyond a side of the window as evenly as within it, at half of the places or more.
+fn goes_on(grid: &Grid, corner: Cell, (w, h): (i32, i32)) -> bool {
+    // A side: its first cell, the step along it, how many cells it has, and the step outwards.
+    let (left, top) = corner;
+    let (right, bottom) = (left + w - 1, top + h - 1);
+    let sides = [
+        ((left, top), (0, 1), h, (-1, 0)),
+        ((right, top), (0, 1), h, (1, 0)),
+        ((left, top), (1, 0), w, (0, -1)),
+        ((left, bottom), (1, 0), w, (0, 1)),
+    ];
+    sides.into_iter().any(|(first, along, count, out)| {
+        let goes_on = (0..count).filter(|k| {
+            let at =
+                |n: i32| grid.get(&(first.0 + k * along.0 + n * out.0, first.1 + k * along.1 + n * out.1));
+            let (Some(inner), Some(border), Some(outer)) = (at(-1), at(0), at(1)) else { return false };
+            let step = border - inner;
+            (outer - border - step).norm() < EVEN * step.norm()
+        });
+        2 * goes_on.count() as i32 > count
+    })
 }
 
 fn extents(grid: &Grid) -> Option<[[i32; 2]; 2]> {

@@ -275,3 +275,31 @@ fn what_cannot_be_found_is_said_and_nothing_is_written() {
     assert!(run.stderr.contains("1 frames could not be decoded"), "{}", run.stderr);
     assert!(run.stdout.starts_with("5 frames, 5 with the chessboard"), "{}", run.stdout);
 }
+
+/// OpenCV's own example photographs: the surroundings hang on to the board in most of them.
+#[test]
+fn boards_are_found_in_all_photographs_of_opencv() {
+    let Some(data) = shared("data/chess_opencv") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("board.json");
+    let detect = |size: &str| {
+        let words = [
+            "labels",
+            "detect",
+            data.to_str().unwrap(),
+            "--chessboard",
+            size,
+            "--out",
+            out.to_str().unwrap(),
+        ];
+        vice_tests::vice(&words)
+    };
+    // A part of the board is no board, and nothing is written.
+    for part in ["6x5", "8x6", "9x5", "10x7"] {
+        let run = detect(part);
+        assert!(run.code == 1 && !out.exists(), "{part}: {}{}", run.stdout, run.stderr);
+    }
+    let run = detect("9x6");
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    assert!(run.stdout.contains("13 with the chessboard"), "{}", run.stdout);
+}
