@@ -126,6 +126,8 @@ pub struct LabelSet {
     pub dataset: Option<String>,
     /// Camera they belong to, where the file says so.
     pub camera: Option<String>,
+    /// Tool that made those that are `auto`, where it is not the tracker of VICE.
+    pub tool: Option<String>,
 }
 
 /// A row as a file has it: not checked yet.
@@ -273,7 +275,8 @@ impl LabelSet {
             return Err(unknown.clone());
         }
         let points = self.points.iter().filter(|p| names.contains(&p.name)).cloned().collect();
-        Ok(Self { points, dataset: self.dataset.clone(), camera: self.camera.clone() })
+        let (dataset, camera, tool) = (self.dataset.clone(), self.camera.clone(), self.tool.clone());
+        Ok(Self { points, dataset, camera, tool })
     }
 
     /// Number of observations of all points.

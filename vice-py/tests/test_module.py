@@ -22,7 +22,7 @@ FUNCTIONS = {
     "trajectory": ["trajectory.compare", "trajectory.ape", "trajectory.rpe"],
     "calibration": ["calibration_diff"],
     "floor": ["fit_floor"],
-    "labels": ["convert_labels", "detect_labels", "track_labels"],
+    "labels": ["compare_labels", "convert_labels", "detect_labels", "track_labels"],
     "plugin": ["check_format", "new_plugin"],
     "depth": ["depth", "depth_compare"],
     "batch": ["batch", "collect", "scan", "ray.run"],

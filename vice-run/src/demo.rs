@@ -15,7 +15,9 @@ use vice_files::atomic::{Overwrite, write};
 use vice_files::image_file::encode_png;
 use vice_synthetic::{Synthetic, SyntheticOptions, write_euroc};
 
+use crate::auto_labels::TrackingSpec;
 use crate::error::{RunError, RunResult};
+use crate::evaluation::Samples;
 use crate::progress::Progress;
 use crate::report::frames::Shots;
 use crate::report::html::{IMAGE_BUDGET_BYTES, Run, Section, render};
@@ -23,12 +25,16 @@ use crate::report::numbers::{first_and_last, mean};
 use crate::report::overlay::{Canvas, Colour, ESTIMATE_GREEN, ESTIMATE_YELLOW, LABEL_BLUE};
 use crate::report::table;
 use crate::request::DepthName;
-use crate::request::{EstimateSpec, Request};
+use crate::request::{DatasetSpec, EstimateSpec, Request};
 use crate::result::{ResultDocument, Used};
+use crate::scene::Scene;
 
 /// The estimates that are shown, the colours of their dots, and what is wrong with them.
 const ESTIMATES: [(&str, Colour); 3] =
     [("exact", [255, 255, 255]), ("drift", ESTIMATE_GREEN), ("clock-offset", ESTIMATE_YELLOW)];
+
+/// Points that are followed without a hand.
+const AUTO_POINTS: usize = 20;
 
 /// Makes the flight, evaluates and diagnoses its estimates, and tells what the numbers mean. With a folder the flight, the
 /// result, a picture and a page are kept there; `force` writes into one that is not empty.
@@ -47,6 +53,7 @@ pub fn run(out: Option<&Path>, force: bool, progress: &Progress<'_>) -> RunResul
     text.push_str(&table::render(&document));
     text.push('\n');
     text.push_str(&in_words(&document)?);
+    text.push_str(&without_a_hand(progress)?);
     text.push_str("\nWhat `vice diagnose` makes of it, from the labels alone\n");
     for line in &verdicts {
         writeln!(text, "- {line}")?;
@@ -118,10 +125,37 @@ fn evaluate_flight(
         anchor: GROUND_TRUTH.to_string(),
         time_offset_s: 0.0,
         align: evaluation.align.name().to_string(),
+        label_noise_px: None,
     };
     let document = ResultDocument::new(request(kept), used, evaluate(&evaluation, &|_, _| {})?);
     let verdicts = diagnose_estimates(&evaluation, progress)?;
     Ok((document, verdicts))
+}
+
+/// The same estimates by labels that nobody placed: the first seconds of the flight in small pictures, so that it takes no
+/// longer than all the rest.
+fn without_a_hand(progress: &Progress<'_>) -> RunResult<String> {
+    let options =
+        SyntheticOptions { duration_s: 3.0, rate_hz: 10.0, width: 320, height: 240, ..Default::default() };
+    let flight: Arc<dyn Dataset> = Arc::new(Synthetic::new(options)?);
+    let opened = DatasetSpec::default().apply_to(flight)?;
+    let spec = TrackingSpec { points: Some(AUTO_POINTS), ..TrackingSpec::default() };
+    let scene = Scene::of(opened, &spec.reference, spec.max_gap)?;
+    let made = spec.run_on(&scene, progress)?;
+    let mut opened = scene.opened.clone();
+    let labels = opened.in_memory.add_labels(made.labels.clone());
+    let mut request =
+        Request::new("", labels, ["exact", "drift"].map(|name| EstimateSpec::from(name.to_string())));
+    request.depth.sources = vec![DepthName::ZCam];
+    let document = request.evaluate(&opened, Samples::Drop, progress)?;
+    let px = |stream: &str| part(&document, stream, "zcam")?.pooled_rmse_px.ok_or_else(not_scored);
+    Ok(format!(
+        "- labels without a hand: {AUTO_POINTS} points that were chosen and followed by themselves in the first 3 s ({} labels, half \
+         as wide pictures) give exact {:.2} px and drift {:.2} px: `vice evaluate ... --labels auto`.\n",
+        made.report.made,
+        px("exact")?,
+        px("drift")?
+    ))
 }
 
 /// What asks for the same again, where the flight is kept.

@@ -8,6 +8,7 @@ use vice_files::{address, labels};
 
 use crate::auto_labels::{self, TrackingSpec};
 use crate::error::{Context, RunError, RunResult};
+use crate::label_noise::{put_into, read_floor};
 use crate::open::Opened;
 use crate::place::Place;
 use crate::progress::Progress;
@@ -123,6 +124,8 @@ impl Request {
         progress: &Progress<'_>,
     ) -> RunResult<ResultDocument> {
         let keep = matches!(samples, Samples::Keep);
+        // Before the work, so that a mistake costs nothing.
+        let label_noise_px = self.labels.noise.as_deref().map(read_floor).transpose()?;
         let (checks, not_made) = self.depth.make_checks(opened);
         let checks: Vec<&dyn DepthSource> = checks.iter().map(AsRef::as_ref).collect();
         self.with_evaluation(opened, keep, progress, |evaluation, streams| {
@@ -144,7 +147,11 @@ impl Request {
                 },
                 time_offset_s: streams.time_offset.as_secs_f64(),
                 align: evaluation.align.name().to_string(),
+                label_noise_px,
             };
+            if let Some(floor_px) = label_noise_px {
+                found.pixel.iter_mut().for_each(|part| put_into(part, floor_px));
+            }
             Ok(ResultDocument::new(self.clone(), used, found))
         })
     }

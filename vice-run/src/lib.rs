@@ -37,6 +37,8 @@ pub mod formats;
 mod imu_start;
 pub mod in_memory;
 pub mod info;
+pub mod label_compare;
+pub mod label_noise;
 pub mod open;
 pub mod place;
 pub mod plugin;

@@ -39,7 +39,7 @@ pub fn is_field(text: &str) -> bool {
 }
 
 /// Fields that have an option of the same name.
-const FIELDS: [&str; 34] = [
+const FIELDS: [&str; 37] = [
     "add",
     "align",
     "allow-writable-plugin",
@@ -58,8 +58,11 @@ const FIELDS: [&str; 34] = [
     "floor-plane",
     "force",
     "format",
+    "fps",
+    "from",
     "initial-pose",
     "interpolate",
+    "label-noise",
     "labels",
     "max-gap",
     "mend",

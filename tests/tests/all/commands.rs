@@ -27,7 +27,9 @@ fn pooled(document: &Value, stream: &str) -> f64 {
 fn the_demo_tells_good_from_bad() {
     let folder = tempfile::tempdir().unwrap();
     let said = good(vice(&["demo", "--quiet"]));
-    for words in ["exact: the dots stay on their points", "drift:", "clock-offset:", "agree"] {
+    for words in
+        ["exact: the dots stay on their points", "drift:", "clock-offset:", "labels without a hand:", "agree"]
+    {
         assert!(said.contains(words), "{said}");
     }
     assert!(!said.contains("do not agree"), "{said}");

@@ -116,8 +116,12 @@ fn what_a_person_placed_stays_and_is_gone_on_from() {
     rows.sort_by_key(|row| row.split(',').next().map(str::to_string));
     let point = rows[0].split(',').next().unwrap();
     let own: Vec<&str> = rows.iter().copied().filter(|r| r.split(',').next() == Some(point)).collect();
-    let kept: Vec<&str> =
-        own.iter().enumerate().filter(|(i, r)| i % 5 == 0 || r.contains(",1")).map(|(_, r)| *r).collect();
+    let kept: Vec<&str> = own
+        .iter()
+        .enumerate()
+        .filter(|(i, r)| i % 5 == 0 || r.split(',').nth(4) == Some("1"))
+        .map(|(_, r)| *r)
+        .collect();
     let mine = folder.path().join("mine.csv");
     std::fs::write(&mine, format!("{head}\n{}\n", kept.join("\n"))).unwrap();
     let out = folder.path().join("more.csv");
@@ -257,4 +261,113 @@ fn automatic_labels_are_made_where_an_evaluation_asks_for_them() {
     // With another depth other labels are made.
     good(&evaluate("evaluate", "auto:12", &["--depth", "floor"]));
     assert_eq!(std::fs::read_dir(cache.join("labels")).unwrap().count(), 2);
+}
+
+#[test]
+fn two_labellers_are_compared_and_their_noise_goes_into_the_intervals() {
+    let folder = tempfile::tempdir().unwrap();
+    let flight = flight(folder.path());
+    let exact = flight.join("labels/scene.csv");
+    // Another person: off to and fro by a pixel.
+    let text_of = std::fs::read_to_string(&exact).unwrap();
+    let moved = text_of.lines().enumerate().map(|(i, line)| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_string).collect();
+        if i > 0 {
+            let off = if i % 2 == 0 { 1.0 } else { -1.0 };
+            cells[2] = (cells[2].parse::<f64>().unwrap() + off).to_string();
+        }
+        cells.join(",")
+    });
+    let other = folder.path().join("other.csv");
+    std::fs::write(&other, moved.collect::<Vec<_>>().join("\n") + "\n").unwrap();
+    let (noise, plot) = (folder.path().join("noise.json"), folder.path().join("noise.svg"));
+    let outputs = ["--json", text(&noise), "--plot", text(&plot)];
+    let run = vice(&[&["labels", "compare", text(&exact), text(&other)][..], &outputs].concat());
+    assert!(good(&run).contains("floor under RMSE_2D"), "{}", run.stdout);
+    let compared = json(&noise);
+    assert!((compared["all"]["median_px"].as_f64().unwrap() - 1.0).abs() < 1e-6, "{compared}");
+    let floor = compared["floor_px"].as_f64().unwrap();
+    assert!(floor > 0.5 && floor < 1.5, "{floor}");
+    assert!(std::fs::read_to_string(&plot).unwrap().starts_with("<svg"));
+    let out = folder.path().join("result.json");
+    let drift = flight.join("estimates/drift.txt");
+    let asked = |more: &[&str]| -> Value {
+        let words = [
+            "evaluate",
+            text(&flight),
+            "--labels",
+            text(&exact),
+            "--estimate",
+            text(&drift),
+            "--json",
+            text(&out),
+        ];
+        good(&vice(&[&words[..], more].concat()));
+        json(&out)
+    };
+    let (without, with) = (asked(&[]), asked(&["--label-noise", text(&noise)]));
+    assert_eq!(with["used"]["label_noise_px"], compared["floor_px"]);
+    let part = |document: &Value| {
+        document["pixel"].as_array().unwrap().iter().find(|p| p["stream"] == "drift").unwrap().clone()
+    };
+    let (before, after) = (part(&without), part(&with));
+    assert_eq!(before["pooled_rmse_px"], after["pooled_rmse_px"]);
+    if let Some(low) = before["interval_95"][0].as_f64() {
+        let expected = (low * low - floor * floor).max(0.0).sqrt();
+        assert!((after["interval_95"][0].as_f64().unwrap() - expected).abs() < 1e-9, "{after}");
+        assert_eq!(before["interval_95"][1], after["interval_95"][1]);
+    }
+    let wrong = vice(&[
+        "evaluate",
+        text(&flight),
+        "--labels",
+        text(&exact),
+        "--estimate",
+        text(&drift),
+        "--label-noise",
+        text(&exact),
+    ]);
+    assert!(wrong.code == 2 && wrong.stderr.contains("vice labels compare"), "{}", wrong.stderr);
+}
+
+#[test]
+fn tracks_of_other_tools_become_labels() {
+    let folder = tempfile::tempdir().unwrap();
+    let flight = flight(folder.path());
+    let frames = 20;
+    let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({frames}, 1, 2), }}");
+    header.push_str(&" ".repeat((64 - (11 + header.len()) % 64) % 64));
+    header.push('\n');
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    (0..frames)
+        .for_each(|i| bytes.extend([100.0 + i as f32, 50.0].iter().flat_map(|v: &f32| v.to_le_bytes())));
+    let (tracks, out) = (folder.path().join("tracks.npy"), folder.path().join("out.json"));
+    std::fs::write(&tracks, &bytes).unwrap();
+    let convert =
+        |more: &[&str]| vice(&[&["labels", "convert", text(&tracks), text(&out)][..], more].concat());
+    good(&convert(&["--dataset", text(&flight), "--tool", "CoTracker3"]));
+    let document = json(&out);
+    assert_eq!(document["tool"], "CoTracker3");
+    let observations = document["points"][0]["observations"].as_array().unwrap();
+    assert_eq!(observations.len(), frames as usize);
+    assert_eq!(
+        (&observations[3]["px"][0], &observations[3]["source"]),
+        (&Value::from(103.0), &Value::from("auto"))
+    );
+    let fewer = convert(&["--dataset", text(&flight), "--force", "--duration", "1"]);
+    assert!(
+        fewer.code == 1 && fewer.stderr.contains("20 frames") && fewer.stderr.contains("--fps"),
+        "{}",
+        fewer.stderr
+    );
+    let nothing = convert(&["--force"]);
+    assert!(nothing.code == 2 && nothing.stderr.contains("--dataset"), "{}", nothing.stderr);
+    let labels = flight.join("labels/scene.csv");
+    let wrong = vice(&["labels", "convert", text(&labels), text(&out), "--force", "--tool", "x"]);
+    assert!(wrong.code == 2 && wrong.stderr.contains("--tool"), "{}", wrong.stderr);
+    // Where labels are asked for, the way there is told.
+    let direct = vice(&["evaluate", text(&flight), "--labels", text(&tracks), "--estimate", "ground-truth"]);
+    assert!(direct.code == 1 && direct.stderr.contains("vice labels convert"), "{}", direct.stderr);
 }

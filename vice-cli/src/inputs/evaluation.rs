@@ -9,7 +9,7 @@ use vice_run::request::{LabelsSpec, Protocol, Request, Scoring};
 use super::{DatasetArgs, DepthArgs, StreamArgs, positive, span_not_negative, split_list};
 
 /// What a request in a file takes the place of.
-pub(crate) const ASKED: [&str; 30] = [
+pub(crate) const ASKED: [&str; 31] = [
     "path",
     "format",
     "settings",
@@ -19,6 +19,7 @@ pub(crate) const ASKED: [&str; 30] = [
     "labels",
     "points",
     "observations",
+    "label_noise",
     "fps",
     "start",
     "duration",
@@ -91,6 +92,9 @@ pub(crate) struct LabelArgs {
     /// Whose labels count: those that are not flagged as uncertain, all, or only those that a human placed.
     #[arg(long, value_name = "certain|manual|all", default_value = "certain")]
     observations: Observations,
+    /// How far off labels are, as `vice labels compare --json` tells: the noise is taken off the lower ends of intervals.
+    #[arg(long, value_name = "FILE")]
+    label_noise: Option<PathBuf>,
 }
 
 /// The part of the run that is looked at.
@@ -114,6 +118,7 @@ impl LabelArgs {
             file: self.labels.clone().unwrap_or_default(),
             points: split_list(&self.points),
             observations: self.observations,
+            noise: self.label_noise.clone(),
         }
     }
 }

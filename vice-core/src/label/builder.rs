@@ -78,6 +78,6 @@ impl LabelSetBuilder {
                 return Err(LabelError::Duplicate { point: point.name.clone(), stamp: stamps[i + 1], line });
             }
         }
-        Ok(LabelSet { points, dataset: None, camera: None })
+        Ok(LabelSet { points, ..LabelSet::default() })
     }
 }

@@ -99,13 +99,18 @@ def clock(reference: Any, estimate: Any, **options: Any) -> dict[str, Any]:
     return _document(["clock"], [reference, estimate], options)
 
 
+def compare_labels(a: Any, b: Any, **options: Any) -> str:
+    """How far two sets of labels of the same points lie apart, which is the floor under RMSE_2D (``json="noise.json"``)."""
+    return _run(["labels", "compare"], [a, b], options)
+
+
 def convert(run: Any, out: Any, *, to: str, **options: Any) -> str:
     """Writes a pose stream of a recording as a trajectory file: ``tum``, ``kitti``, ``euroc``."""
     return _run(["convert"], [run, out], {"to": to, **options})
 
 
 def convert_labels(source: Any, out: Any, **options: Any) -> str:
-    """Converts labels between CSV, JSON, Parquet and CVAT's XML, or from the authors' pickle."""
+    """Converts labels between CSV, JSON, Parquet and CVAT's XML, or from the authors' pickle or tracks (``.npy``, ``.npz``)."""
     return _run(["labels", "convert"], [source, out], options)
 
 

@@ -149,7 +149,8 @@ impl TrackingSpec {
         };
         let auto = auto_labels(&film, &opened.camera, &timeline, &options)
             .map_err(|e| RunError::from(e.at(vice_files::address::shown_path(&self.dataset.path))))?;
-        if auto.points.iter().all(Vec::is_empty) {
+        // What was gone on from may have been all there is.
+        if from.is_none() && auto.points.iter().all(Vec::is_empty) {
             return Err(RunError::missing(format!(
                 "{}: no point could be followed in {} frames{}",
                 opened.dataset.name(),
@@ -188,6 +189,7 @@ impl TrackingSpec {
         overwrite: Overwrite,
         progress: &Progress<'_>,
     ) -> RunResult<Tracked> {
+        self.check()?;
         labels::LabelFormat::for_writing(out)?;
         if overwrite == Overwrite::Refuse && out.exists() {
             return Err(RunError::usage("out", format!("{} exists already", out.display()))

@@ -19,6 +19,7 @@ pub(super) fn resolved(request: &Request, base: &Path) -> Request {
     if !is_auto(&request.labels.file) {
         join(&mut request.labels.file);
     }
+    request.labels.noise.iter_mut().for_each(join);
     request.dataset.calibration.iter_mut().for_each(join);
     request.dataset.plugins.files.iter_mut().for_each(join);
     request.streams.times.iter_mut().for_each(join);

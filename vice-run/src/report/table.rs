@@ -90,6 +90,12 @@ fn held_labels(document: &ResultDocument) -> String {
         ]);
     }
     let mut text = format!("\n{}", align(&grid));
+    if let Some(floor) = document.used.label_noise_px {
+        let told = format!(
+            "labels alone are off by {floor:.3} px (`label-noise`): low ends of intervals are without that\n"
+        );
+        text.push_str(&with_options(&told));
+    }
     for remark in document.pixel.iter().flat_map(held::remarks) {
         text.push_str(&format!("{remark}\n"));
     }

@@ -41,6 +41,7 @@ fn options(request: &Request) -> Vec<(&'static str, String)> {
     let observations =
         (labels.observations != Default::default()).then(|| labels.observations.name().to_string());
     add("observations", observations);
+    add("label-noise", labels.noise.as_deref().map(told));
     add("fps", protocol.fps.map(|v| v.to_string()));
     add("start", (protocol.start != Default::default()).then(|| protocol.start.as_secs_f64().to_string()));
     add("duration", protocol.duration.map(|d| d.as_secs_f64().to_string()));

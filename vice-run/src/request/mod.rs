@@ -120,6 +120,13 @@ pub struct LabelsSpec {
     /// Whose labels count.
     #[serde(default)]
     pub observations: Observations,
+    /// How far off labels are: a comparison of labels, `vice.label-compare/1`, whose floor goes into the intervals.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "word::path_option::serialize"
+    )]
+    pub noise: Option<PathBuf>,
 }
 
 /// The part of a run that is looked at.
@@ -292,6 +299,7 @@ impl Request {
     pub fn inputs(&self) -> Vec<PathBuf> {
         let mut files = vec![self.dataset.path.clone()];
         files.extend(Some(&self.labels.file).filter(|file| !is_auto(file)).cloned());
+        files.extend(self.labels.noise.clone());
         files.extend(self.streams.estimates.iter().filter_map(|e| e.path().map(Path::to_path_buf)));
         if let ReferenceSpec::Named(EstimateSpec::Named(name)) = &self.streams.reference {
             files.push(PathBuf::from(name));

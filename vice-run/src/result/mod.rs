@@ -63,6 +63,9 @@ pub struct Used {
     pub time_offset_s: f64,
     /// Alignment of the trajectory errors.
     pub align: String,
+    /// Noise of the labels that the intervals are without, pixels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub label_noise_px: Option<f64>,
 }
 
 impl ResultDocument {

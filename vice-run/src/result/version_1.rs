@@ -57,6 +57,7 @@ impl From<Document> for ResultDocument {
             anchor: old.settings.anchor.clone(),
             time_offset_s: old.settings.time_offset_s,
             align: old.settings.align.clone(),
+            label_noise_px: None,
         };
         Self {
             schema: SCHEMA.to_string(),
@@ -105,6 +106,7 @@ fn request(s: &Settings, dataset: &DatasetPart, pixel: &[PixelPart]) -> Request 
             points: list("points"),
             // What was the default then.
             observations: other("observations").and_then(|o| o.parse().ok()).unwrap_or(Observations::All),
+            noise: None,
         },
         protocol: Protocol { fps: s.fps, start: span(s.start_s), duration: s.duration_s.map(span) },
         streams: StreamsSpec {

@@ -32,11 +32,21 @@ pub(super) struct Seen {
     pub(super) back_px: f32,
 }
 
-/// How sure a place is.
+/// Of places for which everything speaks so many are further off than a pixel, and of those for which nothing does.
+const MISSED: [f64; 2] = [0.002, 0.1];
+/// And so many more of those that were not held against the others, or not gone back to.
+const MISSED_UNCHECKED: f64 = 0.035;
+
+/// How sure a place is: the share of such places that lie within a pixel of where their key frame's point is.
+///
+/// Fitted to 34 000 labels of rendered flights, of a floor of bricks, with motion blur and under changing light, and of a
+/// hand-held camera before tags: see docs/labels.md.
 pub(super) fn confidence(seen: &Seen, off: f64) -> f64 {
-    let fall = |x: f64| if x.is_nan() { 0.9 } else { 1.0 / (1.0 + x.powi(4)) };
-    let all = f64::from(seen.confidence) * fall(f64::from(seen.back_px) / 1.0) * fall(off / 1.5);
-    all.clamp(0.0, 1.0)
+    let back = f64::from(seen.back_px);
+    let fall = |x: f64| if x.is_nan() { 1.0 } else { 1.0 / (1.0 + x.powi(4)) };
+    let speaks = f64::from(seen.confidence) * fall(back) * fall(off / 1.5);
+    let unchecked = if back.is_nan() || off.is_nan() { MISSED_UNCHECKED } else { 0.0 };
+    1.0 - (MISSED[0] + MISSED[1] * (1.0 - speaks.clamp(0.0, 1.0)) + unchecked)
 }
 
 /// One point from where it was chosen.

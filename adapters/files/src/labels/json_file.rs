@@ -7,7 +7,7 @@
 //!      "occluded": false, "uncertain": false}]}]}
 //! ```
 //!
-//! `dataset` and `camera` may be missing; so may everything of an observation but its stamp and pixel. An observation that
+//! `dataset`, `camera` and `tool`, which made the automatic ones where it is not VICE, may be missing; so may everything of an observation but its stamp and pixel. An observation that
 //! a machine made may also carry `confidence` (0 to 1), `tracker_version` and `seeded`. Fields that are not known are
 //! passed over, so that a file may carry more.
 
@@ -38,6 +38,8 @@ struct Document {
     dataset: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     camera: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    tool: Option<String>,
     points: Vec<PointDocument>,
 }
 
@@ -107,6 +109,7 @@ pub fn read_json_or_none(bytes: &[u8]) -> DataResult<LabelSet> {
     let mut labels = validated(rows.collect())?;
     labels.dataset = document.dataset;
     labels.camera = document.camera;
+    labels.tool = document.tool;
     Ok(labels)
 }
 
@@ -137,6 +140,7 @@ pub fn write_json(writer: &mut dyn Write, labels: &LabelSet) -> io::Result<()> {
         schema: LABELS_SCHEMA.to_string(),
         dataset: labels.dataset.clone(),
         camera: labels.camera.clone(),
+        tool: labels.tool.clone(),
         points: points.collect(),
     };
     serde_json::to_writer_pretty(&mut *writer, &document)?;

@@ -6,6 +6,7 @@
 //! | JSON | schema `vice.labels/1`, which also names the data set and the camera |
 //! | Parquet | the same in columns, with all that JSON has: for labels by the million |
 //! | CVAT | "CVAT for video 1.1", tracks of points, of the annotation tool CVAT; counts frames, as the pickle does |
+//! | npy, npz | arrays of tracks, (frames, points, 2), as trackers of points write them; read by [`read_tracks`] only |
 //! | pickle | `{point: {frame index: (array([x, y]), is_keyframe)}}`, as the paper's authors stored them; read only |
 
 mod chosen;
@@ -17,12 +18,14 @@ mod cvat_task;
 mod cvat_write;
 mod json_file;
 mod ndarray;
+mod npy;
 mod parquet;
 mod pickle;
 mod pickle_machine;
 mod pickle_text;
 mod pickle_values;
 mod rounded;
+mod tracks;
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -37,6 +40,7 @@ pub use cvat::{read_cvat, read_cvat_file};
 pub use cvat_write::write_cvat;
 pub use json_file::{LABELS_SCHEMA, read_json, read_json_or_none, write_json};
 pub use pickle::read_pickle;
+pub use tracks::{TracksOptions, is_tracks, read_tracks};
 
 use crate::atomic::{self, Overwrite};
 use crate::image_file::read_bytes;
@@ -147,6 +151,14 @@ pub fn read_file(path: impl AsRef<Path>, frame_stamps: Option<&[Stamp]>) -> Data
         file
     } else {
         let bytes = read_bytes(path)?;
+        if is_tracks(&bytes) {
+            return Err(DataError::of_kind(
+                ErrorKind::Unsupported,
+                "are tracks in an array of NumPy, not labels",
+            )
+            .at(path)
+            .hint("vice labels convert TRACKS OUT --dataset DATASET makes labels of them"));
+        }
         if let Some(what) = crate::not_text::what(&bytes) {
             return Err(crate::not_text::error(what).at(path));
         }
