@@ -198,8 +198,8 @@ fn offset(a: &Observation, b: &Observation) -> [f64; 2] {
 
 fn collect(a: &PointLabels, b: &PointLabels, in_time: &mut Vec<(Stamp, f64)>) -> Collected {
     let mut collected = Collected::default();
-    let others: BTreeMap<Stamp, &Observation> = b.observations.iter().map(|o| (o.stamp, o)).collect();
-    let own: BTreeMap<Stamp, &Observation> = a.observations.iter().map(|o| (o.stamp, o)).collect();
+    let others: BTreeMap<Stamp, Observation> = b.observations.iter().map(|o| (o.stamp, o)).collect();
+    let own: BTreeMap<Stamp, Observation> = a.observations.iter().map(|o| (o.stamp, o)).collect();
     collected.missing[0] = b.observations.iter().filter(|o| !own.contains_key(&o.stamp)).count() as u64;
     // The offset at the start of the segment, and the last one in it.
     let mut segment: Option<([f64; 2], Option<f64>)> = None;
@@ -216,7 +216,7 @@ fn collect(a: &PointLabels, b: &PointLabels, in_time: &mut Vec<(Stamp, f64)>) ->
         let distance_px = one.px.distance_px(other.px);
         collected.distances.push(distance_px);
         in_time.push((one.stamp, distance_px));
-        let now = offset(one, other);
+        let now = offset(&one, other);
         match &mut segment {
             None => segment = Some((now, None)),
             Some((start, last)) => {

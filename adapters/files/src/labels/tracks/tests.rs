@@ -52,7 +52,7 @@ fn an_array_alone_is_read_in_either_order() {
     assert_eq!((labels.points().len(), outside, labels.tool.as_deref()), (2, 0, Some("CoTracker3")));
     assert_eq!(places(&labels, 0), [(0, 10.0, 20.0, true), (1, 11.0, 21.0, false), (2, 12.0, 22.0, false)]);
     assert_eq!(places(&labels, 1)[2], (2, 32.0, 42.0, false));
-    assert_eq!(labels.points()[0].observations[0].source, ObservationSource::Auto);
+    assert_eq!(labels.points()[0].observations.first().unwrap().source, ObservationSource::Auto);
     // TAPIR: points first, and (0, 0) is a corner.
     let turned = [10.0, 20.0, 11.0, 21.0, 12.0, 22.0, 30.0, 40.0, 31.0, 41.0, 32.0, 42.0];
     let bytes = npy("<f4", false, "(2, 3, 2)", &floats(&turned));
