@@ -195,6 +195,8 @@ fn each_command_has_help_with_an_example() {
         "evaluate",
         "trajectory",
         "info",
+        "check",
+        "clock",
         "depth",
         "synth",
         "convert",

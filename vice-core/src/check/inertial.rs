@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 use super::Check;
 use super::motion::{hypotheses, kept_rms};
 use super::turning::Turning;
-use crate::conventions::{Given, cure, list_text};
+use crate::conventions::{Convention, Given, cure, list_text};
 use crate::finding::{Finding, State};
 use crate::frames::rotation_vector_rad;
 use crate::imu::ImuSample;
@@ -23,7 +23,7 @@ pub const CHECK: Check = Check {
     name: "inertial",
     title: "poses against the IMU",
     looks_at: "whether a pose stream turns and accelerates as gyroscope and accelerometer say, and which convention, unit or frame would make it; units of the IMU",
-    threshold: "wrong where a convention leaves less than 40 % of what is unexplained of turns (above 30 %) or accelerations (above 0.2 m/s²); look where nothing explains it",
+    threshold: "wrong where a convention leaves less than half of what is unexplained of turns (above 30 %) or accelerations (above 0.1 m/s²); look where nothing explains it",
     source: "strap-down kinematics; the conventions of vice_core::conventions",
 };
 
@@ -50,12 +50,14 @@ const BIAS_RAD_S: f64 = 0.1;
 const BIAS_M_S2: f64 = 0.3;
 /// What good poses leave unexplained: a share of the turns, and m/s².
 const USUAL_TURNS: f64 = 0.03;
-const USUAL_M_S2: f64 = 0.08;
+const USUAL_M_S2: f64 = 0.04;
 /// More than this needs an explanation.
 const OFF_TURNS: f64 = 0.3;
-const OFF_M_S2: f64 = 0.2;
+const OFF_M_S2: f64 = 0.1;
 /// A convention must leave this share.
-const SHARE: f64 = 0.4;
+const SHARE: f64 = 0.5;
+/// A unit of length must leave this share of what positions that never move leave: a smaller unit also makes noise smaller.
+const OF_NO_MOTION: f64 = 0.7;
 /// ... and not more than this.
 const LEFT_TURNS: f64 = 0.35;
 const LEFT_M_S2: f64 = 1.5;
@@ -145,15 +147,32 @@ pub fn inertial(
             let tier = |left: &Left| (left.score() / TIE).round();
             tier(&a.1).total_cmp(&tier(&b.1)).then(a.0.len().cmp(&b.0.len()))
         });
+        let still = stretches.left(
+            &stretches
+                .read
+                .map_poses(|_, pose| crate::frames::Rigid::from_parts(Vector3::zeros(), pose.rotation())),
+        );
+        let moves = |list: &[Convention], left: &Left| {
+            let still = still.as_ref().and_then(|s| s.m_s2);
+            list.iter().all(|c| c.unit_m().is_none())
+                || left.m_s2.zip(still).is_some_and(|(a, still)| a < OF_NO_MOTION * still)
+        };
         let fits = |left: &Left| {
             left.score() < read.score() + SHARE.ln()
                 && left.turns < LEFT_TURNS
                 && left.m_s2.is_none_or(|a| a < LEFT_M_S2)
         };
-        if let Some((list, left)) = tried.first().filter(|(_, left)| fits(left)) {
-            let alike: Vec<String> = tried[1..]
+        if let Some((list, left)) =
+            tried.iter().find(|(list, left)| moves(list, left)).filter(|(_, left)| fits(left))
+        {
+            let alike: Vec<String> = tried
                 .iter()
-                .filter(|(other, l)| l.score() < left.score() + TIE && other.len() <= list.len())
+                .filter(|(other, l)| {
+                    other != list
+                        && moves(other, l)
+                        && l.score() < left.score() + TIE
+                        && other.len() <= list.len()
+                })
                 .map(|(other, _)| list_text(other))
                 .take(3)
                 .collect();

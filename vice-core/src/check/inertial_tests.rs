@@ -109,3 +109,28 @@ fn units_of_the_imu_are_told() {
     assert!(with(|s| s.accel_m_s2 /= 9.81).contains("in g"));
     assert!(with(|s| s.gyro_rad_s *= 180.0 / std::f64::consts::PI).contains("degrees a second"));
 }
+
+#[test]
+fn noise_of_the_positions_is_no_smaller_unit() {
+    // A body that turns in its place, and a tracker whose positions jitter by centimetres.
+    let samples: Vec<ImuSample> = (0..6000_i64)
+        .map(|i| {
+            let t = i as f64 * 0.005;
+            let (h, turn) = (1e-3, |t: f64| pose(t).rotation());
+            let step = turn(t - h).inverse() * turn(t + h);
+            ImuSample {
+                stamp: Stamp::from_nanos(i * 5_000_000),
+                gyro_rad_s: rotation_vector_rad(&step) / (2.0 * h),
+                accel_m_s2: turn(t).inverse() * Vector3::new(0.0, 0.0, 9.81),
+            }
+        })
+        .collect();
+    let rows = (0..580_i64).map(|i| {
+        let jitter =
+            Vector3::new((i * 7919 % 101) as f64, (i * 6101 % 97) as f64, (i * 5003 % 89) as f64) * 3e-4;
+        (Stamp::from_nanos(i * 50_000_000), Rigid::from_parts(jitter, pose(i as f64 * 0.05).rotation()))
+    });
+    let trajectory = Trajectory::from_poses(rows.collect::<Vec<_>>()).unwrap();
+    let found = inertial(&samples, ("est", &trajectory), Span::ZERO, true, Given::default());
+    assert!(found.iter().all(|f| f.state != State::Wrong), "{found:?}");
+}

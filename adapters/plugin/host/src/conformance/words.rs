@@ -17,6 +17,12 @@ impl Check<'_> {
         if facts.iter().any(|f| f.section.trim().is_empty() || f.text.trim().is_empty()) {
             self.fault("a fact for `vice info` has no heading or no text");
         }
+        self.step("its own checks");
+        for finding in dataset.checks() {
+            if finding.check.trim().is_empty() || finding.says.trim().is_empty() {
+                self.fault("a finding of its own checks has no name or no sentence");
+            }
+        }
         self.step("suspicions");
         let suspicions = dataset.suspicions();
         let mut seen = BTreeSet::new();
