@@ -6,6 +6,7 @@
 //! labels of a frame share its pose, all labels of a segment its key frame. Cost: frames times the square of the state.
 
 #![expect(clippy::needless_range_loop, reason = "indices of matrices are clearer as indices")]
+#![expect(clippy::manual_memcpy, reason = "a copy of a slice is a call, and takes registers through memory")]
 
 mod state;
 mod update;

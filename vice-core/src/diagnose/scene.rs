@@ -28,6 +28,8 @@ pub(super) type Residual = Vector2<f64>;
 pub(super) const LOST_PX: f64 = 400.0;
 /// Depths of the segments' key points, metres along the optical axis.
 type Depths = Arc<Vec<Option<f64>>>;
+/// Poses at the frames.
+type Poses = Arc<Vec<WorldFromBody>>;
 
 /// Answers of a depth source that are kept.
 const KEPT_DEPTHS: usize = 96;
@@ -83,7 +85,7 @@ pub(super) struct Scene<'a> {
     pub(super) fixed_depth: bool,
     kept: Mutex<HashMap<Vec<u64>, Depths>>,
     /// Poses at the frames that were read last: most flaws are not the motion's.
-    kept_poses: Mutex<Vec<(Vec<u64>, Arc<Vec<WorldFromBody>>)>>,
+    kept_poses: Mutex<Vec<(Vec<u64>, Poses)>>,
 }
 
 /// When a row is exposed, as a share of the read-out time from the middle row.
@@ -213,12 +215,7 @@ impl<'a> Scene<'a> {
     }
 
     /// Poses at the frames.
-    pub(super) fn poses(
-        &self,
-        theta: &Theta,
-        reader: &Reader<'_>,
-        motion: &Motion<'_>,
-    ) -> Arc<Vec<WorldFromBody>> {
+    pub(super) fn poses(&self, theta: &Theta, reader: &Reader<'_>, motion: &Motion<'_>) -> Poses {
         let mut key = vec![motion.id];
         for flaw in Flaw::ALL.iter().filter(|f| f.of_the_motion()) {
             key.extend(theta.of(*flaw).iter().map(|v| (v + 0.0).to_bits()));
@@ -227,7 +224,7 @@ impl<'a> Scene<'a> {
         if let Some((_, poses)) = kept().iter().find(|(k, _)| *k == key) {
             return Arc::clone(poses);
         }
-        let poses: Arc<Vec<WorldFromBody>> = Arc::new(self.frames.iter().map(|f| reader.at(f.t_s)).collect());
+        let poses: Poses = Arc::new(self.frames.iter().map(|f| reader.at(f.t_s)).collect());
         let mut kept = kept();
         if kept.len() >= KEPT_POSES {
             kept.remove(0);

@@ -135,6 +135,12 @@ impl<'a> Scorer<'a> {
         let name = PointName(point.name.clone());
         let mut scored = ScoredPoint::default();
         let mut scratch = Scratch::default();
+        if self.windows.is_some() {
+            // All at once: what grows takes twice the room on its way.
+            let count = point.segments.iter().map(|s| s.count).sum();
+            scored.columns.jumps_px.reserve_exact(count);
+            scored.columns.squares_px2.reserve_exact(count);
+        }
         scored.skipped.extend(point.skips.iter().map(|(stamp, reason)| skip(&name, *stamp, *reason)));
         for segment in 0..point.segments.len() {
             let done = self.segment(point, (place, segment, &name), &mut scored, &mut scratch);

@@ -355,11 +355,12 @@ mod tests {
     fn observation(line: u64) -> Observation {
         let mut o = Observation::manual(Stamp::from_nanos(line as i64), Pixel::new(line as f64, -0.5));
         o.source = SOURCES[line as usize % 4];
-        (o.keyframe, o.occluded, o.uncertain) = (line % 3 == 0, line % 5 == 0, line % 7 == 0);
+        (o.keyframe, o.occluded, o.uncertain) =
+            (line.is_multiple_of(3), line.is_multiple_of(5), line.is_multiple_of(7));
         o.provenance = Provenance {
-            confidence: (line % 11 == 0).then_some(0.5),
-            tracker_version: (line % 13 == 0).then_some(u32::MAX),
-            seeded: line % 2 == 0,
+            confidence: line.is_multiple_of(11).then_some(0.5),
+            tracker_version: line.is_multiple_of(13).then_some(u32::MAX),
+            seeded: line.is_multiple_of(2),
         };
         Observation { line, ..o }
     }

@@ -38,7 +38,7 @@ pub fn write<T, E: From<DataError>>(
     atomic::write_and_return(path, Overwrite::Replace, |out| {
         let mut file = SerializedFileWriter::new(out, Arc::new(schema), Arc::new(settings)).map_err(wrong)?;
         let value = fill(&mut |columns| {
-            if columns.iter().all(|(_, values)| values.len() == 0) {
+            if columns.iter().all(|(_, values)| values.is_empty()) {
                 return Ok(());
             }
             row_group(&mut file, columns).map_err(io::Error::other)

@@ -23,7 +23,8 @@ mod source;
 #[cfg(feature = "parquet")]
 mod write;
 
-#[cfg(all(test, feature = "parquet"))]
+#[cfg(test)]
+#[cfg(feature = "parquet")]
 mod tests;
 
 use std::fs::File;

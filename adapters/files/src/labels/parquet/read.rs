@@ -226,7 +226,7 @@ impl Table {
             wrong,
             plain: None,
         };
-        Ok(if self.unit == Some(TimeUnit::Nanos) { group.as_plain() } else { group })
+        Ok(if self.unit == Some(TimeUnit::Nanos) { group.into_plain() } else { group })
     }
 }
 
@@ -254,7 +254,7 @@ struct Group {
 
 impl Group {
     /// With its columns as the labels of one point, where they are that and nothing in them asks for a closer look.
-    fn as_plain(mut self) -> Self {
+    fn into_plain(mut self) -> Self {
         let Some(Texts::One(name)) = &self.points else { return self };
         let no_flags = self.flags.as_ref().is_none_or(|f| matches!(f, Texts::One(text) if text.is_empty()));
         let source = match &self.sources {
