@@ -94,7 +94,7 @@ pub(crate) fn find(smooth: &Gray, saddles: &[Saddle], size: BoardSize) -> Found 
     for tolerance in TOLERANCES {
         let mut best: Option<Board> = None;
         for grid in grids(saddles, &links(saddles, tolerance)) {
-            match fit(smooth, grid, size) {
+            match fit(smooth, &grid, size) {
                 Found::Board(board) if best.as_ref().is_none_or(|b| board.confidence > b.confidence) => {
                     best = Some(board);
                 }
@@ -167,23 +167,38 @@ fn prune(grid: &mut Grid) {
     }
 }
 
-/// Whether a grid is the board asked for; missing corners are looked for where they should be.
-fn fit(smooth: &Gray, mut grid: Grid, size: BoardSize) -> Found {
+/// Whether a grid is the board asked for, in the place of it where it is the most even.
+fn fit(smooth: &Gray, grid: &Grid, size: BoardSize) -> Found {
     let (w, h) = (size.columns as i32, size.rows as i32);
     let shapes = if w == h { vec![(w, h)] } else { vec![(w, h), (h, w)] };
-    let Some((inside, corner, shape)) =
-        shapes.into_iter().filter_map(|shape| window(&grid, shape)).max_by_key(|(inside, _, _)| *inside)
-    else {
-        return other_size(&grid);
-    };
     let wanted = size.columns * size.rows;
-    // What hangs on at some places is the surroundings; a side that goes on is a larger board.
-    if inside * 2 < wanted || goes_on(&grid, corner, shape) {
-        return other_size(&grid);
+    let windows: Vec<(usize, Cell, (i32, i32))> = shapes.into_iter().flat_map(|s| windows(grid, s)).collect();
+    let most = windows.iter().map(|(inside, _, _)| *inside).max().unwrap_or(0);
+    if most * 2 < wanted {
+        return other_size(grid);
     }
+    // What hangs on at some places is the surroundings; a side that goes on is a larger board.
+    let nearly = windows.into_iter().filter(|(inside, _, _)| (inside + wanted / 10) >= most);
+    let ends: Vec<_> = nearly.filter(|(_, corner, shape)| !goes_on(grid, *corner, *shape)).collect();
+    let boards =
+        ends.iter().filter_map(|(_, corner, shape)| board_in(smooth, grid.clone(), (*corner, *shape), size));
+    match boards.reduce(|a, b| if b.confidence > a.confidence { b } else { a }) {
+        Some(board) => Found::Board(board),
+        None if ends.is_empty() => other_size(grid),
+        None => Found::Nothing,
+    }
+}
+
+/// The board in a window of the grid; missing corners are looked for where they should be.
+fn board_in(
+    smooth: &Gray,
+    mut grid: Grid,
+    (corner, shape): (Cell, (i32, i32)),
+    size: BoardSize,
+) -> Option<Board> {
     grid.retain(|cell, _| in_window(*cell, corner, shape));
     if !complete(smooth, &mut grid, corner, shape) {
-        return Found::Nothing;
+        return None;
     }
     let corners: Vec<Vector2<f64>> = grid_in_order(&grid, corner, shape);
     let spacing = spacing(&corners, shape);
@@ -192,33 +207,26 @@ fn fit(smooth: &Gray, mut grid: Grid, size: BoardSize) -> Found {
     for c in &corners {
         match saddle::refine(smooth, c.x, c.y, reach) {
             Some((x, y)) if (x - c.x).hypot(y - c.y) < 1.5 => refined.push(Vector2::new(x, y)),
-            _ => return Found::Nothing,
+            _ => return None,
         }
     }
     let unevenness = unevenness(&refined, shape);
     if unevenness > 0.1 * spacing || !colours_alternate(smooth, &refined, shape) {
-        return Found::Nothing;
+        return None;
     }
     let turns = turns(smooth, &refined, shape, size);
     if turns.is_empty() {
-        return Found::Nothing;
+        return None;
     }
-    Found::Board(Board { turns, confidence: (1.0 / (1.0 + (unevenness / 0.25).powi(2))) as f32 })
+    Some(Board { turns, confidence: (1.0 / (1.0 + (unevenness / 0.25).powi(2))) as f32 })
 }
 
-/// The place where a shape covers most corners: how many, its first cell, and the shape.
-fn window(grid: &Grid, shape: (i32, i32)) -> Option<(usize, Cell, (i32, i32))> {
-    let [i, j] = extents(grid)?;
-    let mut best = None;
-    for j0 in j[0]..=(j[1] - shape.1 + 1).max(j[0]) {
-        for i0 in i[0]..=(i[1] - shape.0 + 1).max(i[0]) {
-            let inside = grid.keys().filter(|c| in_window(**c, (i0, j0), shape)).count();
-            if best.is_none_or(|(most, _, _)| inside > most) {
-                best = Some((inside, (i0, j0), shape));
-            }
-        }
-    }
-    best
+/// All places of a shape: how many corners it covers, its first cell, and the shape.
+fn windows(grid: &Grid, shape: (i32, i32)) -> Vec<(usize, Cell, (i32, i32))> {
+    let Some([i, j]) = extents(grid) else { return vec![] };
+    let rows = j[0]..=(j[1] - shape.1 + 1).max(j[0]);
+    let starts = rows.flat_map(|j0| (i[0]..=(i[1] - shape.0 + 1).max(i[0])).map(move |i0| (i0, j0)));
+    starts.map(|start| (grid.keys().filter(|c| in_window(**c, start, shape)).count(), start, shape)).collect()
 }
 
 /// Whether the grid goes on beyond a side of the window as evenly as within it, at half of the places or more.

@@ -292,7 +292,7 @@ fn boards_are_found_in_all_photographs_of_opencv() {
             "--out",
             out.to_str().unwrap(),
         ];
-        vice_tests::vice(&words)
+        vice(&words)
     };
     // A part of the board is no board, and nothing is written.
     for part in ["6x5", "8x6", "9x5", "10x7"] {
