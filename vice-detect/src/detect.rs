@@ -85,6 +85,12 @@ impl DetectReport {
         if !self.undecoded.is_empty() {
             text += &format!(", {} could not be decoded", self.undecoded.len());
         }
+        if self.twice > 0 {
+            text += &format!(
+                ", {} tags were left out since their frames hold two of the same number",
+                self.twice
+            );
+        }
         if let Some((w, h, count)) = self.other_board {
             text += &format!(" (a grid of {w}x{h} is in {count} of them)");
         }
