@@ -1,8 +1,11 @@
 use super::*;
 use vice_core::label::LabelRow;
 
-/// Points by name: rows of a stamp in seconds, a place, and whether a segment starts.
-fn labels(points: &[(&str, &[(f64, f64, f64, bool)])]) -> LabelSet {
+/// A stamp in seconds, a place, and whether a segment starts.
+type Row = (f64, f64, f64, bool);
+
+/// Points by name.
+fn labels(points: &[(&str, &[Row])]) -> LabelSet {
     let rows = points.iter().flat_map(|(name, rows)| {
         rows.iter().map(|(s, u, v, keyframe)| {
             let stamp = Stamp::from_nanos((s * 1e9) as i64);

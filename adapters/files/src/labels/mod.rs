@@ -193,26 +193,27 @@ pub fn read_points(
         let frames = frame_stamps.unwrap_or_default();
         let stamps = || file.labels.points().iter().flat_map(|p| p.observations.stamps()).copied();
         // Whether stamps were rounded is asked of all of them where none is at a frame.
-        if (sifted.at_a_frame || stamps().any(|s| frames.binary_search(&s).is_ok()))
-            && let Ok(file) = of_points(file, points)
-        {
-            return Ok(about(path, file));
+        if sifted.at_a_frame || stamps().any(|s| frames.binary_search(&s).is_ok()) {
+            let (file, are_there) = of_points(file, points);
+            if are_there {
+                return Ok(about(path, file));
+            }
         }
     }
     let file = read_file(path, frame_stamps)?;
-    Ok(of_points(file, points).unwrap_or_else(|all| all))
+    Ok(of_points(file, points).0)
 }
 
-/// The labels of some points; as they were where one is missing.
-fn of_points(file: LabelFile, points: &[String]) -> Result<LabelFile, LabelFile> {
+/// The labels of some points, and whether all of these are there; as they were where one is missing.
+fn of_points(file: LabelFile, points: &[String]) -> (LabelFile, bool) {
     let all = file.labels.points();
     let are_there = points.iter().all(|name| all.iter().any(|p| p.name == *name));
     if are_there && all.iter().all(|p| points.contains(&p.name)) {
-        return Ok(file);
+        return (file, true);
     }
     match file.labels.select(points) {
-        Ok(labels) => Ok(LabelFile { labels, ..file }),
-        Err(_) => Err(file),
+        Ok(labels) => (LabelFile { labels, ..file }, true),
+        Err(_) => (file, false),
     }
 }
 
