@@ -185,7 +185,7 @@ pub fn read_points(
         let file = parquet::read_parquet(path, Some(points)).map_err(|e| e.at(path))?;
         let stamps = || file.labels.points().iter().flat_map(|p| p.observations.stamps()).copied();
         let at_a_frame = frame_stamps.is_none_or(|f| stamps().any(|s| f.binary_search(&s).is_ok()));
-        if at_a_frame && let Ok(file) = of_points(file, points) {
+        if at_a_frame && let (file, true) = of_points(file, points) {
             return Ok(about(path, file));
         }
     } else if let Some(sifted) = chosen::sift(path, points, frame_stamps) {
@@ -193,11 +193,10 @@ pub fn read_points(
         let frames = frame_stamps.unwrap_or_default();
         let stamps = || file.labels.points().iter().flat_map(|p| p.observations.stamps()).copied();
         // Whether stamps were rounded is asked of all of them where none is at a frame.
-        if sifted.at_a_frame || stamps().any(|s| frames.binary_search(&s).is_ok()) {
-            let (file, are_there) = of_points(file, points);
-            if are_there {
-                return Ok(about(path, file));
-            }
+        if (sifted.at_a_frame || stamps().any(|s| frames.binary_search(&s).is_ok()))
+            && let (file, true) = of_points(file, points)
+        {
+            return Ok(about(path, file));
         }
     }
     let file = read_file(path, frame_stamps)?;
