@@ -3,7 +3,6 @@
 use pulp::{Simd, WithSimd};
 
 use super::carry::{Carried, Start};
-use super::score::Columns;
 use super::select::{SelectedPoint, SelectedSegment};
 use super::windows::Windows;
 use crate::lanes::ARCH;
@@ -11,6 +10,15 @@ use crate::metrics::by_age::{Samples, SegmentErrors};
 use crate::metrics::held::median_of;
 use crate::metrics::pixel::SquaredErrors;
 use crate::track::CameraPath;
+
+/// What is kept of each sample of a point: the rest is carried once more where it is asked for.
+#[derive(Default)]
+pub(super) struct Columns {
+    /// By how much it is off from those around it, px.
+    pub(super) jumps_px: Vec<f32>,
+    /// The squared error, px².
+    pub(super) squares_px2: Vec<f64>,
+}
 
 /// Columns of one segment, used again for the next.
 #[derive(Default)]

@@ -4,7 +4,7 @@ use crate::parallel::*;
 use nalgebra::Point3;
 
 use super::carry::Start;
-use super::columns::{Scratch, median_residual};
+use super::columns::{Columns, Scratch, median_residual};
 use super::runs::index;
 use super::select::{SelectedPoint, SelectedSegment};
 use super::streams::PosesAtFrames;
@@ -29,15 +29,6 @@ pub(super) struct Scored {
     pub(super) segments: Vec<ScoredSegment>,
     /// By point: the numbers of its samples.
     pub(super) columns: Vec<Columns>,
-}
-
-/// What is kept of each sample of a point: the rest is carried once more where it is asked for.
-#[derive(Default)]
-pub(super) struct Columns {
-    /// By how much it is off from those around it, px.
-    pub(super) jumps_px: Vec<f32>,
-    /// The squared error, px².
-    pub(super) squares_px2: Vec<f64>,
 }
 
 /// A segment with samples.

@@ -32,7 +32,19 @@ pub struct TracksOptions<'a> {
 
 /// Whether bytes are an array of NumPy or an archive of some.
 pub fn is_tracks(bytes: &[u8]) -> bool {
-    bytes.starts_with(npy::NPY) || bytes.starts_with(npy::NPZ)
+    bytes.starts_with(npy::NPY) || bytes.starts_with(npy::NPZ) && first_name(bytes).ends_with(b".npy")
+}
+
+/// The name of the first file in a ZIP archive: spreadsheets are such archives too.
+fn first_name(archive: &[u8]) -> &[u8] {
+    const LENGTH_AT: usize = 26;
+    const NAME_AT: usize = 30;
+    match archive.get(LENGTH_AT..LENGTH_AT + 2) {
+        Some([low, high]) => {
+            archive.get(NAME_AT..NAME_AT + usize::from(u16::from_le_bytes([*low, *high]))).unwrap_or_default()
+        }
+        _ => &[],
+    }
 }
 
 /// Labels of tracks through the frames of these stamps, in images of so many columns and rows. Places outside of the
