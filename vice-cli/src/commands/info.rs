@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use vice_run::check::{CheckRequest, check, head};
+use vice_run::check::{CheckRequest, check_open, head};
 use vice_run::core::dataset::Probe;
 use vice_run::formats;
 use vice_run::info::describe;
@@ -33,7 +33,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     if spec.camera.is_some() {
         spec.camera_name(dataset.as_ref())?;
     }
-    let checked = check(&CheckRequest { dataset: spec.clone(), ..CheckRequest::default() }).ok();
+    let request = CheckRequest { dataset: spec.clone(), ..CheckRequest::default() };
+    // What cannot be checked is said where it is asked for; what the data set holds is shown all the same.
+    let checked = check_open(&request, dataset.clone()).ok();
     let text = describe(dataset.as_ref(), spec.camera.as_deref())?;
     let head = checked.map_or_else(String::new, |document| head(&document));
     terminal::print(&match text.split_once('\n') {

@@ -18,7 +18,6 @@ use vice_core::trajectory::Trajectory;
 use super::CheckRequest;
 use super::images::{self, World3d};
 use crate::error::{RunError, RunResult};
-use crate::formats;
 use crate::open::Opened;
 
 /// The name of findings about what was repaired, left out or cannot be read.
@@ -50,10 +49,9 @@ struct PoseStream {
     is_truth: bool,
 }
 
-/// Opens the recording and reads what is small.
-pub(super) fn gather(request: &CheckRequest) -> RunResult<Gathered> {
+/// Reads what is small of a recording that is open.
+pub(super) fn gather(request: &CheckRequest, raw: Arc<dyn Dataset>) -> RunResult<Gathered> {
     let spec = &request.dataset;
-    let raw = spec.open_raw(&formats::registry(&spec.plugins)?)?;
     let mut read = Vec::new();
     let opened = match spec.apply_to(Arc::clone(&raw)) {
         Ok(opened) => Some(opened),

@@ -11,9 +11,11 @@ mod page;
 mod text;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use vice_core::check::{CHECKS, Finding, State};
+use vice_core::dataset::Dataset;
 
 pub use calibration_diff::{CalibrationDiffDocument, CalibrationDiffRequest, compare_calibrations};
 pub use clock::{ClockDocument, ClockRequest, compare_clocks};
@@ -21,6 +23,7 @@ pub use page::page;
 pub use text::{head, list_text, render};
 
 use crate::error::RunResult;
+use crate::formats;
 use crate::request::{DatasetSpec, Request, StreamsSpec};
 
 /// What is checked.
@@ -82,7 +85,16 @@ impl CheckRequest {
 /// # Errors
 /// [`RunError`](crate::error::RunError) if no format reads it, or a stream that is named cannot be read.
 pub fn check(request: &CheckRequest) -> RunResult<CheckDocument> {
-    let gathered = gather::gather(request)?;
+    let spec = &request.dataset;
+    check_open(request, spec.open_raw(&formats::registry(&spec.plugins)?)?)
+}
+
+/// Checks a recording that is open already, as the request's data set without its overrides.
+///
+/// # Errors
+/// As [`check`].
+pub fn check_open(request: &CheckRequest, dataset: Arc<dyn Dataset>) -> RunResult<CheckDocument> {
+    let gathered = gather::gather(request, dataset)?;
     let mut findings = gathered.findings(request.images);
     findings.sort_by_key(place);
     let count = |state: State| findings.iter().filter(|f| f.state == state).count();
