@@ -11,12 +11,12 @@ use anyhow::Context;
 use vice_run::core::time::Span;
 use vice_run::files::atomic::{self, Overwrite};
 
-pub(crate) use dataset::{DatasetArgs, PluginArgs, setting};
+pub(crate) use dataset::{Counted, DatasetArgs, PluginArgs, counted_spec, setting};
 pub(crate) use depth::{AnchorArgs, DepthArgs, SourceArgs, on_off};
 #[cfg(test)]
 pub(crate) use evaluation::ASKED;
 pub(crate) use evaluation::{EvaluationArgs, LabelArgs, WindowArgs};
-pub(crate) use streams::StreamArgs;
+pub(crate) use streams::{PoseArgs, StreamArgs};
 
 /// A span in decimal seconds.
 pub(crate) fn span(text: &str) -> Result<Span, String> {

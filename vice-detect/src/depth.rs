@@ -10,7 +10,7 @@ use vice_core::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
 use vice_core::error::{DataError, DataResult};
 
 use crate::detect::find_tags;
-use crate::plane::{self, Rays, SharedPlane};
+use crate::plane::{Alone, SharedPlane, shared};
 use crate::pose::tag_pose;
 use crate::tag::{Tag, TagOptions};
 
@@ -83,19 +83,17 @@ struct Placed {
 /// The planes of tags: one for those that share it, their own for the others.
 fn placed(camera: &Camera, tags: Vec<Tag>, size_m: f64) -> Vec<Placed> {
     let focal_px = camera.fx_fy_cx_cy()[0];
-    let (mut rays, mut starts): (Vec<Rays>, Vec<Vector3<f64>>) = (Vec::new(), Vec::new());
-    let mut placed = Vec::new();
+    let (mut single, mut placed) = (Vec::new(), Vec::new());
     for tag in tags {
         let Some(pose) = tag_pose(camera, &tag.corners, size_m) else { continue };
         let seen = tag.corners.map(|c| camera.unproject(c).map_or(Vector2::repeat(f64::NAN), |ray| ray.xy()));
         let normal = pose.camera_from_tag.rotation * Vector3::z();
         let start = normal / normal.dot(&pose.camera_from_tag.translation.vector);
-        let Some(plane) = plane::alone(&seen, size_m, start, focal_px) else { continue };
-        rays.push(seen);
-        starts.push(start);
-        placed.push(Placed { tag, plane, ambiguous: pose.ambiguous });
+        let Some(alone) = Alone::new(seen, size_m, start, focal_px) else { continue };
+        placed.push(Placed { tag, plane: alone.plane, ambiguous: pose.ambiguous });
+        single.push(alone);
     }
-    if let Some((plane, together)) = plane::shared(&rays, size_m, &starts, focal_px) {
+    if let Some((plane, together)) = shared(&single, size_m, focal_px) {
         for at in together {
             placed[at].plane = plane;
             placed[at].ambiguous = false;

@@ -40,36 +40,37 @@ impl SharedPlane {
     }
 }
 
-/// The plane through one tag alone, from the plane of its pose.
-pub(crate) fn alone(tag: &Rays, size_m: f64, start: Vector3<f64>, focal_px: f64) -> Option<SharedPlane> {
-    let fitted = fit(&[*tag], size_m, start)?;
-    // Two numbers are left over to judge by, which is too few to believe that corners are better than usual.
-    let sigma = (fitted.errors.iter().sum::<f64>() / 2.0).sqrt().max(CORNER_PX / focal_px);
-    plane(&fitted, sigma)
+/// A tag by itself.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Alone {
+    rays: Rays,
+    /// The plane through it.
+    pub(crate) plane: SharedPlane,
+    /// Its squared errors on that plane, normalised coordinates.
+    error: f64,
+}
+
+impl Alone {
+    /// The plane through one tag, from the plane of its pose.
+    pub(crate) fn new(rays: Rays, size_m: f64, start: Vector3<f64>, focal_px: f64) -> Option<Self> {
+        let fitted = fit(&[rays], size_m, start)?;
+        let error: f64 = fitted.errors.iter().sum();
+        // Two numbers are left over to judge by, which is too few to believe that corners are better than usual.
+        let plane = plane(&fitted, (error / 2.0).sqrt().max(CORNER_PX / focal_px))?;
+        Some(Self { rays, plane, error })
+    }
 }
 
 /// The plane that tags share, and which of them do: all, or all but some that lie elsewhere. `None` if no two do.
-///
-/// `starts` are the planes of their own poses.
-pub(crate) fn shared(
-    tags: &[Rays],
-    size_m: f64,
-    starts: &[Vector3<f64>],
-    focal_px: f64,
-) -> Option<(SharedPlane, Vec<usize>)> {
-    let own: Vec<f64> = tags
-        .iter()
-        .zip(starts)
-        .map(|(tag, start)| fit(&[*tag], size_m, *start).map_or(f64::INFINITY, |f| f.errors.iter().sum()))
-        .collect();
-    let mut kept: Vec<usize> = (0..tags.len()).filter(|i| own[*i].is_finite()).collect();
+pub(crate) fn shared(tags: &[Alone], size_m: f64, focal_px: f64) -> Option<(SharedPlane, Vec<usize>)> {
+    let mut kept: Vec<usize> = (0..tags.len()).collect();
     while kept.len() >= 2 {
         let n = kept.len() as f64;
-        let chosen: Vec<Rays> = kept.iter().map(|i| tags[*i]).collect();
-        let start = through(&chosen, &kept.iter().map(|i| starts[*i]).collect::<Vec<_>>())?;
+        let chosen: Vec<Rays> = kept.iter().map(|i| tags[*i].rays).collect();
+        let start = through(kept.iter().map(|i| &tags[*i]))?;
         let fitted = fit(&chosen, size_m, start)?;
         // Of 8 numbers of each tag 3 place it on the plane; the plane has 3.
-        let alone: f64 = kept.iter().map(|i| own[*i]).sum();
+        let alone: f64 = kept.iter().map(|i| tags[*i].error).sum();
         let sigma2 = (alone / (2.0 * n)).max((FLAT_PX / focal_px).powi(2));
         let together: f64 = fitted.errors.iter().sum();
         if together - alone <= ADDED * (3.0 * n - 3.0) * sigma2 {
@@ -77,7 +78,7 @@ pub(crate) fn shared(
             return Some((plane(&fitted, sigma)?, kept));
         }
         // The one that a plane of its own helps most.
-        let gain = |at: usize| fitted.errors[at] - own[kept[at]];
+        let gain = |at: usize| fitted.errors[at] - tags[kept[at]].error;
         let worst = (0..kept.len()).max_by(|a, b| gain(*a).total_cmp(&gain(*b)))?;
         kept.remove(worst);
     }
@@ -90,13 +91,13 @@ fn plane(fitted: &Fitted, sigma: f64) -> Option<SharedPlane> {
 }
 
 /// The plane nearest to the corners where each tag's own plane has them: least squares in inverse depth.
-fn through(tags: &[Rays], planes: &[Vector3<f64>]) -> Option<Vector3<f64>> {
+fn through<'a>(tags: impl Iterator<Item = &'a Alone>) -> Option<Vector3<f64>> {
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for (tag, plane) in tags.iter().zip(planes) {
-        for corner in tag {
+    for tag in tags {
+        for corner in &tag.rays {
             let ray = corner.push(1.0);
             normal += ray * ray.transpose();
-            right += ray * plane.dot(&ray);
+            right += ray * tag.plane.per_m.dot(&ray);
         }
     }
     normal.cholesky().map(|c| c.solve(&right))
@@ -258,11 +259,11 @@ mod tests {
         (0..12).map(|i| [0.12 * f64::from(i % 4) - 0.18, 0.12 * f64::from(i / 4) - 0.12, 0.0]).collect()
     }
 
-    fn starts(tags: &[Rays]) -> Vec<Vector3<f64>> {
-        // Facing the camera at the distance that the size says.
-        tags.iter()
-            .map(|t| Vector3::new(0.0, 0.0, ((t[1] - t[0]).norm() + (t[3] - t[0]).norm()) / (2.0 * SIZE_M)))
-            .collect()
+    fn alone(tags: &[Rays]) -> Vec<Alone> {
+        // From facing the camera at the distance that the size says.
+        let start =
+            |t: &Rays| Vector3::new(0.0, 0.0, ((t[1] - t[0]).norm() + (t[3] - t[0]).norm()) / (2.0 * SIZE_M));
+        tags.iter().map(|t| Alone::new(*t, SIZE_M, start(t), FOCAL_PX).unwrap()).collect()
     }
 
     fn truth(camera_from_board: &Isometry3<f64>, ray: &Vector3<f64>) -> f64 {
@@ -274,7 +275,7 @@ mod tests {
     fn tags_without_errors_give_their_plane_exactly() {
         for tilt in [-0.6, 0.1, 0.7] {
             let (tags, board) = board(tilt, &grid(), 0.0);
-            let (plane, kept) = shared(&tags, SIZE_M, &starts(&tags), FOCAL_PX).unwrap();
+            let (plane, kept) = shared(&alone(&tags), SIZE_M, FOCAL_PX).unwrap();
             assert_eq!(kept.len(), tags.len());
             for ray in tags.iter().flatten().map(|c| c.push(1.0)) {
                 let (z_m, _) = plane.depth_m(&ray).unwrap();
@@ -286,8 +287,8 @@ mod tests {
     #[test]
     fn together_they_are_better_than_alone_and_both_know_how_good_they_are() {
         let (tags, board) = board(0.4, &grid(), 0.15);
-        let starts = starts(&tags);
-        let (plane, _) = shared(&tags, SIZE_M, &starts, FOCAL_PX).unwrap();
+        let alone = alone(&tags);
+        let (plane, _) = shared(&alone, SIZE_M, FOCAL_PX).unwrap();
         let errors = |plane: &SharedPlane, tag: &Rays| -> Vec<(f64, f64)> {
             let each = tag.iter().map(|c| c.push(1.0)).map(|ray| {
                 let (z_m, sigma_m) = plane.depth_m(&ray).unwrap();
@@ -296,11 +297,7 @@ mod tests {
             each.collect()
         };
         let joint: Vec<_> = tags.iter().flat_map(|t| errors(&plane, t)).collect();
-        let single: Vec<_> = tags
-            .iter()
-            .zip(&starts)
-            .flat_map(|(t, start)| errors(&alone(t, SIZE_M, *start, FOCAL_PX).unwrap(), t))
-            .collect();
+        let single: Vec<_> = tags.iter().zip(&alone).flat_map(|(t, alone)| errors(&alone.plane, t)).collect();
         let rms = |all: &[(f64, f64)], pick: fn(&(f64, f64)) -> f64| {
             (all.iter().map(|e| pick(e).powi(2)).sum::<f64>() / all.len() as f64).sqrt()
         };
@@ -316,13 +313,10 @@ mod tests {
         let mut places = grid();
         places[5][2] = 0.1;
         let (tags, board) = board(0.3, &places, 0.1);
-        let (plane, kept) = shared(&tags, SIZE_M, &starts(&tags), FOCAL_PX).unwrap();
+        let (plane, kept) = shared(&alone(&tags), SIZE_M, FOCAL_PX).unwrap();
         assert_eq!(kept, [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11]);
         let ray = tags[0][0].push(1.0);
         assert!((plane.depth_m(&ray).unwrap().0 - truth(&board, &ray)).abs() < 0.004);
-        assert!(
-            shared(&tags[..1], SIZE_M, &starts(&tags[..1]), FOCAL_PX).is_none(),
-            "one tag shares nothing"
-        );
+        assert!(shared(&alone(&tags[..1]), SIZE_M, FOCAL_PX).is_none(), "one tag shares nothing");
     }
 }

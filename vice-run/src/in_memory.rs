@@ -12,6 +12,7 @@ use vice_core::label::LabelSet;
 use vice_core::trajectory::Trajectory;
 
 use crate::error::{RunError, RunResult};
+use crate::text::hex;
 
 /// Starts the name of what was handed over.
 pub const PREFIX: &str = "in-memory:";
@@ -104,10 +105,6 @@ fn hash_of_labels(labels: &LabelSet) -> String {
         }
     }
     hex(&hasher.finalize())
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 #[cfg(test)]

@@ -64,6 +64,7 @@ impl StreamsSpec {
         let time_offset = loader.time_offset;
         loader.reference = loader.load_reference()?;
         let mut list: Vec<Stream> = loader.reference.iter().cloned().collect();
+        let clock = loader.reference.as_ref().and_then(late::Clock::of);
         let mut inertial = None;
         for (place, spec) in self.estimates.iter().enumerate() {
             let integrates = *spec == EstimateSpec::ImuEuler && !loader.is_stream(IMU_EULER);
@@ -83,7 +84,7 @@ impl StreamsSpec {
             let stream = Stream { name, role: Role::Estimate, trajectory, time_offset, align };
             if let (Some(reference), false) = (&loader.reference, integrates) {
                 loader.suspicions.extend(turned_body(reference, &stream, self.max_gap));
-                loader.suspicions.extend(late::clock(reference, &stream));
+                loader.suspicions.extend(clock.as_ref().and_then(|clock| clock.wrong(&stream)));
             }
             list.push(stream);
         }

@@ -4,11 +4,8 @@ use std::path::PathBuf;
 
 use vice_run::check::{CheckRequest, check, list_text, page, render};
 use vice_run::core::check::State;
-use vice_run::core::conventions::Convention;
-use vice_run::core::time::Span;
-use vice_run::request::{EstimateFrame, EstimateSpec, ReferenceSpec, StreamsSpec};
 
-use crate::inputs::{DatasetArgs, span, span_not_negative, split_list, to_json};
+use crate::inputs::{DatasetArgs, PoseArgs, to_json};
 use crate::outputs::Outputs;
 use crate::terminal::{self, Outcome};
 
@@ -31,24 +28,8 @@ pub(crate) struct Args {
     /// Estimates beside the data set's own streams: files, or names of streams.
     #[arg(long, value_name = "NAME|FILE,...")]
     estimate: Vec<String>,
-    /// What they are compared with, or none [default: ground-truth where there is one].
-    #[arg(long, value_name = "NAME|FILE|none")]
-    reference: Option<String>,
-    /// Whose poses the estimates give: body, camera, or a file with body_from_estimate (4x4).
-    #[arg(long, value_name = "body|camera|FILE", default_value = "body")]
-    estimate_frame: EstimateFrame,
-    /// What the estimates are, where that is not what they are read as: inverse, wxyz, conjugate, camera, mm, ...
-    #[arg(long, value_name = "WORD,...", value_delimiter = ',')]
-    estimate_as: Vec<Convention>,
-    /// Times of KITTI files [default: times.txt beside each].
-    #[arg(long, value_name = "FILE")]
-    times: Option<PathBuf>,
-    /// Seconds added to the stamps of the estimates [default: 0, or what --calibration says].
-    #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = span)]
-    time_offset: Option<Span>,
-    /// Widest gap between two poses that is interpolated, seconds.
-    #[arg(long, value_name = "S", default_value = "0.1", value_parser = span_not_negative)]
-    max_gap: Span,
+    #[command(flatten)]
+    poses: PoseArgs,
     /// Also decode a sample of images and depth images, and read the cloud.
     #[arg(long)]
     images: bool,
@@ -64,20 +45,7 @@ impl Args {
     fn request(&self) -> CheckRequest {
         let mut dataset = self.dataset.spec();
         dataset.calibration.clone_from(&self.calibration);
-        CheckRequest {
-            dataset,
-            images: self.images,
-            streams: StreamsSpec {
-                estimates: split_list(&self.estimate).into_iter().map(EstimateSpec::from).collect(),
-                reference: ReferenceSpec::from(self.reference.clone()),
-                estimate_frame: self.estimate_frame.clone(),
-                estimate_as: self.estimate_as.clone(),
-                times: self.times.clone(),
-                time_offset: self.time_offset,
-                max_gap: self.max_gap,
-                ..StreamsSpec::default()
-            },
-        }
+        CheckRequest { dataset, images: self.images, streams: self.poses.spec(&self.estimate) }
     }
 }
 

@@ -1,7 +1,10 @@
 //! Which data set, which camera of it, and plugins.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use vice_run::core::time::Stamp;
+use vice_run::formats;
 use vice_run::request::{DatasetSpec, PluginsSpec};
 
 /// Which data set, and which camera of it.
@@ -52,6 +55,33 @@ impl DatasetArgs {
 impl PluginArgs {
     pub(crate) fn spec(&self) -> PluginsSpec {
         PluginsSpec { files: self.files.clone(), allow_writable: self.allow_writable_plugin }
+    }
+}
+
+/// The frames of a camera, which some files of labels count.
+pub(crate) struct Counted {
+    pub(crate) dataset: String,
+    pub(crate) camera: String,
+    pub(crate) stamps: Arc<[Stamp]>,
+}
+
+/// A data set that is named for its frames.
+pub(crate) fn counted_spec(path: &Path, camera: Option<&str>, plugins: &PluginArgs) -> DatasetSpec {
+    DatasetSpec {
+        path: path.to_path_buf(),
+        camera: camera.map(str::to_string),
+        plugins: plugins.spec(),
+        ..DatasetSpec::default()
+    }
+}
+
+impl Counted {
+    /// Those of a data set, which may have no calibration.
+    pub(crate) fn of(spec: &DatasetSpec) -> anyhow::Result<Self> {
+        let dataset = spec.open_raw(&formats::registry(&spec.plugins)?)?;
+        let camera = spec.camera_name(dataset.as_ref())?;
+        let stamps = dataset.frames(&camera)?;
+        Ok(Self { dataset: dataset.name().to_string(), camera, stamps })
     }
 }
 

@@ -9,13 +9,9 @@ use vice_run::request::{Anchor, EstimateFrame, EstimateSpec, ReferenceSpec, Stre
 use super::{numbers, span, span_not_negative, split_list};
 use crate::terminal::usage;
 
-/// Which pose streams are evaluated, and how their poses are read.
+/// What estimates are compared with, and how their poses are read.
 #[derive(Clone, Debug, clap::Args)]
-#[command(next_help_heading = "Pose streams")]
-pub(crate) struct StreamArgs {
-    /// Estimates to evaluate: names of streams, imu-euler, or files.
-    #[arg(long, value_name = "NAME|FILE,...", required = true)]
-    estimate: Vec<String>,
+pub(crate) struct PoseArgs {
     /// What they are compared with, or none [default: ground-truth where there is one].
     #[arg(long, value_name = "NAME|FILE|none")]
     reference: Option<String>,
@@ -35,6 +31,33 @@ pub(crate) struct StreamArgs {
     /// Widest gap between two poses that is interpolated, seconds.
     #[arg(long, value_name = "S", default_value = "0.1", value_parser = span_not_negative)]
     max_gap: Span,
+}
+
+impl PoseArgs {
+    /// Of these estimates.
+    pub(crate) fn spec(&self, estimates: &[String]) -> StreamsSpec {
+        StreamsSpec {
+            estimates: split_list(estimates).into_iter().map(EstimateSpec::from).collect(),
+            reference: ReferenceSpec::from(self.reference.clone()),
+            estimate_frame: self.estimate_frame.clone(),
+            estimate_as: self.estimate_as.clone(),
+            times: self.times.clone(),
+            time_offset: self.time_offset,
+            max_gap: self.max_gap,
+            ..StreamsSpec::default()
+        }
+    }
+}
+
+/// Which pose streams are evaluated, and how their poses are read.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Pose streams")]
+pub(crate) struct StreamArgs {
+    /// Estimates to evaluate: names of streams, imu-euler, or files.
+    #[arg(long, value_name = "NAME|FILE,...", required = true)]
+    estimate: Vec<String>,
+    #[command(flatten)]
+    poses: PoseArgs,
     /// What places the camera in the world for floor and Z-map depth: reference, estimate (the first), or the name of a
     /// stream [default: the reference where there is one, else each estimate for itself].
     #[arg(long, value_name = "reference|estimate|NAME")]
@@ -46,23 +69,15 @@ pub(crate) struct StreamArgs {
 
 impl StreamArgs {
     pub(crate) fn spec(&self) -> anyhow::Result<StreamsSpec> {
-        let estimates: Vec<EstimateSpec> =
-            split_list(&self.estimate).into_iter().map(EstimateSpec::from).collect();
-        // A command that does not ask for estimates may do with the reference.
-        if !self.estimate.is_empty() && estimates.is_empty() {
-            return Err(usage("--estimate: no estimate is named"));
-        }
-        Ok(StreamsSpec {
-            estimates,
-            names: Vec::new(),
-            reference: ReferenceSpec::from(self.reference.clone()),
-            estimate_frame: self.estimate_frame.clone(),
-            estimate_as: self.estimate_as.clone(),
-            times: self.times.clone(),
-            time_offset: self.time_offset,
-            max_gap: self.max_gap,
+        let spec = StreamsSpec {
             anchor: self.anchor.clone(),
             initial_pose: self.initial_pose,
-        })
+            ..self.poses.spec(&self.estimate)
+        };
+        // A command that does not ask for estimates may do with the reference.
+        if !self.estimate.is_empty() && spec.estimates.is_empty() {
+            return Err(usage("--estimate: no estimate is named"));
+        }
+        Ok(spec)
     }
 }

@@ -8,9 +8,10 @@
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use super::Check;
-use super::motion::{hypotheses, kept_rms};
+use super::cures::{cures, so_read};
+use super::motion::kept_rms;
 use super::turning::Turning;
-use crate::conventions::{Convention, Given, cure, list_text};
+use crate::conventions::{Convention, Given, list_text};
 use crate::finding::{Finding, State};
 use crate::frames::rotation_vector_rad;
 use crate::imu::ImuSample;
@@ -136,17 +137,7 @@ pub fn inertial(
     };
     let is_off = read.turns > OFF_TURNS || read.m_s2.is_some_and(|a| a > OFF_M_S2);
     if is_off {
-        let mut tried: Vec<_> = hypotheses()
-            .into_iter()
-            .filter_map(|list| {
-                let cured = cure(&list, &stretches.read, given).ok()?;
-                Some((list, stretches.left(&cured)?))
-            })
-            .collect();
-        tried.sort_by(|a, b| {
-            let tier = |left: &Left| (left.score() / TIE).round();
-            tier(&a.1).total_cmp(&tier(&b.1)).then(a.0.len().cmp(&b.0.len()))
-        });
+        let tried = cures(&stretches.read, given, TIE, Left::score, |cured| stretches.left(cured));
         let still = stretches.left(
             &stretches
                 .read
@@ -165,7 +156,7 @@ pub fn inertial(
         if let Some((list, left)) =
             tried.iter().find(|(list, left)| moves(list, left)).filter(|(_, left)| fits(left))
         {
-            let alike: Vec<String> = tried
+            let alike = tried
                 .iter()
                 .filter(|(other, l)| {
                     other != list
@@ -173,15 +164,8 @@ pub fn inertial(
                         && l.score() < left.score() + TIE
                         && other.len() <= list.len()
                 })
-                .map(|(other, _)| list_text(other))
-                .take(3)
-                .collect();
-            let or = match alike.is_empty() {
-                true => String::new(),
-                false => format!(" (or {}, which fit as well)", alike.join(" or ")),
-            };
-            let words: Vec<String> = list.iter().map(|c| c.words()).collect();
-            let says = format!("{}: so read, {name} moves as the IMU does{or}", words.join(", and "));
+                .map(|(other, _)| other);
+            let says = so_read(list, alike, &format!("{name} moves as the IMU does"));
             let finding = Finding::new(CHECK.name, about, State::Wrong, says);
             let finding = numbers(numbers(finding, &read, "unexplained"), left, "then-left");
             return vec![finding.mend(format!("`estimate-as` {}", list_text(list)))];

@@ -7,6 +7,7 @@
 pub mod camera_difference;
 pub mod clock;
 pub mod coverage;
+mod cures;
 pub mod inertial;
 pub mod motion;
 pub mod optics;

@@ -6,7 +6,8 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::Check;
-use crate::conventions::{Convention, Given, cure, list_text};
+use super::cures::{cures, so_read};
+use crate::conventions::{Convention, Given, list_text};
 use crate::finding::{Finding, State};
 use crate::frames::{Body, Rigid, WorldFromBody, rotation_angle_rad, rotation_vector_rad};
 use crate::metrics::align::best_rotation;
@@ -64,21 +65,6 @@ impl Unexplained {
     }
 }
 
-/// The lists of conventions that are tried, singles first.
-pub(super) fn hypotheses() -> Vec<Vec<Convention>> {
-    let mut lists: Vec<Vec<Convention>> = Convention::TRIED.iter().map(|c| vec![*c]).collect();
-    for order in [Convention::WFirst, Convention::WLast] {
-        lists.push(vec![order, Convention::InversePose]);
-        lists.push(vec![order, Convention::ConjugateQuaternion]);
-        lists.push(vec![order, Convention::CameraAsBody]);
-    }
-    lists.push(vec![Convention::InversePose, Convention::CameraAsBody]);
-    for unit in [Convention::Millimetres, Convention::Centimetres] {
-        lists.push(vec![unit, Convention::CameraAsBody]);
-    }
-    lists
-}
-
 /// Motions of the reference, and the estimate's poses at their ends.
 struct Motions {
     /// Estimate's poses as read, at their own stamps.
@@ -113,33 +99,14 @@ pub fn motion(
     if read.turns.unwrap_or(0.0).max(read.way.unwrap_or(0.0)) <= OFF {
         return fits(&motions, estimate.0, &about, read, numbers);
     }
-    let mut tried: Vec<(Vec<Convention>, Unexplained)> = hypotheses()
-        .into_iter()
-        .filter_map(|list| {
-            let cured = cure(&list, &motions.read, given).ok()?;
-            Some((list, motions.unexplained(&cured)?))
-        })
-        .collect();
-    // Stable: of those that fit alike the more usual one comes first.
-    tried.sort_by(|a, b| {
-        let tier = |u: &Unexplained| (u.total() / TIE).round();
-        tier(&a.1).total_cmp(&tier(&b.1)).then(a.0.len().cmp(&b.0.len()))
-    });
+    let tried = cures(&motions.read, given, TIE, Unexplained::total, |cured| motions.unexplained(cured));
     let best = tried.first().filter(|(_, u)| u.total() < SHARE * read.total() && u.total() < 1.5 * OFF);
     if let Some((list, left)) = best {
-        let alike: Vec<String> = tried[1..]
+        let alike = tried[1..]
             .iter()
             .filter(|(other, u)| u.total() < left.total() + TIE && other.len() <= list.len())
-            .map(|(other, _)| list_text(other))
-            .take(3)
-            .collect();
-        let words: Vec<String> = list.iter().map(|c| c.words()).collect();
-        let or = match alike.is_empty() {
-            true => String::new(),
-            false => format!(" (or {}, which fit as well)", alike.join(" or ")),
-        };
-        let says =
-            format!("{}: so read, {} moves as {} does{or}", words.join(", and "), estimate.0, reference.0);
+            .map(|(other, _)| other);
+        let says = so_read(list, alike, &format!("{} moves as {} does", estimate.0, reference.0));
         let finding = Finding::new(CHECK.name, about, State::Wrong, says);
         let finding = numbers(numbers(finding, read, "unexplained"), *left, "then-left");
         let frame = if list == &[Convention::CameraAsBody] { ", or `estimate-frame` camera" } else { "" };

@@ -19,6 +19,7 @@ use super::{Tracked, TrackingSpec};
 use crate::error::RunResult;
 use crate::progress::Progress;
 use crate::scene::Scene;
+use crate::text::hex;
 
 /// The cache folder, in place of the user's.
 const CACHE: &str = "VICE_CACHE";
@@ -169,8 +170,4 @@ fn scan(cloud: &vice_core::dataset::CloudRef) -> String {
         }
         _ => String::new(),
     }
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }

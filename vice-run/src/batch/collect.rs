@@ -8,7 +8,6 @@ use sha2::{Digest, Sha256};
 use vice_files::atomic::{self, Overwrite};
 
 use super::beside::Beside;
-use super::content::hex;
 use super::fleet_table::{self, render};
 use super::key::Key;
 use super::results::{ResultRow, SCHEMA};
@@ -18,6 +17,7 @@ use super::store::{RowRecord, Store};
 use crate::error::{RunError, RunResult};
 use crate::report::csv::cell;
 use crate::result;
+use crate::text::hex;
 use vice_files::tables::{self, Values};
 
 /// What a batch has found so far.

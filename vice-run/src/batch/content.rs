@@ -19,6 +19,7 @@ use vice_files::address::is_address;
 use vice_files::atomic::{self, Overwrite};
 
 use crate::place;
+use crate::text::hex;
 
 /// Largest file that is hashed whole.
 const WHOLE_BYTES: u64 = 64 << 20;
@@ -193,11 +194,6 @@ fn hashed(path: &Path, size: u64) -> io::Result<Content> {
         }
     }
     Ok(Content { hash: hex(&hasher.finalize()), sampled: size > WHOLE_BYTES })
-}
-
-/// Bytes as hexadecimal digits.
-pub(super) fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 #[cfg(test)]

@@ -6,10 +6,11 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::content::{Hashes, hex};
+use super::content::Hashes;
 use super::paths;
 use crate::error::RunResult;
 use crate::request::Request;
+use crate::text::hex;
 
 /// What a run is filed under: a hash of the version, the request as the manifest has it, and the content of what is
 /// read. It ends in `-sampled` where a recording was too large to be hashed whole.

@@ -10,11 +10,11 @@ use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_files::address::shown_path;
 use vice_files::atomic::{self, Overwrite};
 
-use super::content::hex;
 use super::key::Key;
 use super::manifest::{Manifest, Row};
 use crate::request::Request;
 use crate::result::{ResultDocument, read_bytes};
+use crate::text::hex;
 
 const BATCH_SCHEMA: &str = "vice.batch/2";
 const ROW_SCHEMA: &str = "vice.row/1";

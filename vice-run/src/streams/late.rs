@@ -11,23 +11,40 @@ const MOST_POSES: usize = 200_000;
 /// Offsets that are looked at, seconds to either side.
 const RANGE_S: f64 = 1.0;
 
-/// What is wrong with the clock of an estimate; `None` where it is right, or not known.
-pub(super) fn clock(reference: &Stream, estimate: &Stream) -> Option<Suspicion> {
-    if reference.trajectory.len().max(estimate.trajectory.len()) > MOST_POSES {
+/// The clock of a reference, which those of estimates are held against.
+pub(super) struct Clock {
+    name: String,
+    turning: Turning,
+}
+
+impl Clock {
+    /// `None` of a stream that is too long, or does not tell how it turns.
+    pub(super) fn of(reference: &Stream) -> Option<Self> {
+        Some(Self { name: reference.name.clone(), turning: turning(reference)? })
+    }
+
+    /// What is wrong with the clock of an estimate; `None` where it is right, or not known.
+    pub(super) fn wrong(&self, estimate: &Stream) -> Option<Suspicion> {
+        let answer = clock_offset(&self.turning, &turning(estimate)?, Some(RANGE_S));
+        let found = finding(&self.name, &estimate.name, &answer);
+        if found.state != State::Wrong {
+            return None;
+        }
+        // What was added already is part of what mends it.
+        let mut suspicion = found.suspicion()?;
+        if estimate.time_offset != vice_core::time::Span::ZERO {
+            suspicion.advice.push_str(&format!(
+                " beside the {} s that are added already",
+                estimate.time_offset.to_seconds_text()
+            ));
+        }
+        Some(suspicion)
+    }
+}
+
+fn turning(stream: &Stream) -> Option<Turning> {
+    if stream.trajectory.len() > MOST_POSES {
         return None;
     }
-    let (a, b) = (Turning::of_poses(&reference.trajectory)?, Turning::of_poses(&estimate.trajectory)?);
-    let found = finding(&reference.name, &estimate.name, &clock_offset(&a, &b, Some(RANGE_S)));
-    if found.state != State::Wrong {
-        return None;
-    }
-    // What was added already is part of what mends it.
-    let mut suspicion = found.suspicion()?;
-    if estimate.time_offset != vice_core::time::Span::ZERO {
-        suspicion.advice.push_str(&format!(
-            " beside the {} s that are added already",
-            estimate.time_offset.to_seconds_text()
-        ));
-    }
-    Some(suspicion)
+    Turning::of_poses(&stream.trajectory)
 }

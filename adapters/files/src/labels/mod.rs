@@ -40,7 +40,7 @@ pub use cvat::{read_cvat, read_cvat_file};
 pub use cvat_write::write_cvat;
 pub use json_file::{LABELS_SCHEMA, read_json, read_json_or_none, write_json};
 pub use pickle::read_pickle;
-pub use tracks::{TracksOptions, is_tracks, read_tracks};
+pub use tracks::{TracksOptions, is_tracks, is_tracks_file, read_tracks};
 
 use crate::atomic::{self, Overwrite};
 use crate::image_file::read_bytes;

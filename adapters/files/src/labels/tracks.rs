@@ -7,6 +7,10 @@
 //!
 //! A track keeps its point through what hides it, so it is one segment: it starts where the point is first seen.
 
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
 use vice_core::camera::Pixel;
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::label::{LabelSet, LabelSetBuilder, Observation, ObservationSource};
@@ -33,6 +37,14 @@ pub struct TracksOptions<'a> {
 /// Whether bytes are an array of NumPy or an archive of some.
 pub fn is_tracks(bytes: &[u8]) -> bool {
     bytes.starts_with(npy::NPY) || bytes.starts_with(npy::NPZ) && first_name(bytes).ends_with(b".npy")
+}
+
+/// The same of a file, of which no more is read than that takes. One that cannot be read is none.
+pub fn is_tracks_file(path: impl AsRef<Path>) -> bool {
+    const HEAD_BYTES: u64 = 4096;
+    let mut head = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
+    read.is_ok() && is_tracks(&head)
 }
 
 /// The name of the first file in a ZIP archive: spreadsheets are such archives too.

@@ -5,9 +5,8 @@ use std::path::PathBuf;
 use vice_run::files::labels;
 use vice_run::label_compare::compare;
 use vice_run::place::Place;
-use vice_run::request::DatasetSpec;
 
-use crate::inputs::{PluginArgs, to_json};
+use crate::inputs::{Counted, PluginArgs, counted_spec, to_json};
 use crate::outputs::Outputs;
 use crate::terminal::{self, Outcome};
 
@@ -43,23 +42,11 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let outputs = Outputs::new(&[&args.json, &args.plot], &[args.a.clone(), args.b.clone()])?;
-    let frames = match &args.dataset {
-        Some(path) => {
-            let spec = DatasetSpec {
-                path: path.clone(),
-                camera: args.camera.clone(),
-                plugins: args.plugins.spec(),
-                ..DatasetSpec::default()
-            };
-            let dataset = spec.open_raw(&vice_run::formats::registry(&spec.plugins)?)?;
-            let camera = spec.camera_name(dataset.as_ref())?;
-            Some(dataset.frames(&camera)?)
-        }
-        None => None,
-    };
+    let spec = args.dataset.as_ref().map(|path| counted_spec(path, args.camera.as_deref(), &args.plugins));
+    let frames = spec.as_ref().map(Counted::of).transpose()?;
     let read = |file: &PathBuf| -> anyhow::Result<_> {
         let place = Place::of_file(file)?;
-        Ok(place.told(labels::read(place.path(), frames.as_deref()))?)
+        Ok(place.told(labels::read(place.path(), frames.as_ref().map(|f| f.stamps.as_ref())))?)
     };
     let (a, b) = (read(&args.a)?, read(&args.b)?);
     let found = compare((&args.a, &a), (&args.b, &b))?;

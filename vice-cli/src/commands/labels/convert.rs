@@ -10,7 +10,7 @@ use vice_run::files::labels::{self, LabelFormat, TracksOptions};
 use vice_run::place::Place;
 use vice_run::request::{DatasetSpec, Protocol};
 
-use crate::inputs::{PluginArgs, WindowArgs};
+use crate::inputs::{Counted, PluginArgs, WindowArgs, counted_spec};
 use crate::terminal::{self, Outcome, usage};
 
 /// Arguments of `vice labels convert`.
@@ -44,6 +44,13 @@ pub(crate) struct Args {
     /// Replace a file that exists.
     #[arg(long)]
     force: bool,
+}
+
+impl Args {
+    /// The data set whose frames are counted.
+    fn counted_spec(&self) -> Option<DatasetSpec> {
+        self.dataset.as_ref().map(|path| counted_spec(path, self.camera.as_deref(), &self.plugins))
+    }
 }
 
 /// What tracks are of.
@@ -84,14 +91,8 @@ impl TrackArgs {
 
 /// Labels of tracks.
 fn of_tracks(args: &Args, bytes: &[u8]) -> anyhow::Result<(LabelSet, Arc<[Stamp]>)> {
-    let Some(path) = &args.dataset else {
+    let Some(spec) = args.counted_spec() else {
         return Err(usage("--dataset: tracks count frames; name the data set that was tracked"));
-    };
-    let spec = DatasetSpec {
-        path: path.clone(),
-        camera: args.camera.clone(),
-        plugins: args.plugins.spec(),
-        ..DatasetSpec::default()
     };
     let opened = spec.open()?;
     let chosen = args.tracks.window.spec().frames(&opened)?;
@@ -120,7 +121,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let overwrite = if args.force { Overwrite::Replace } else { Overwrite::Refuse };
     let place = Place::of_file(&args.input)?;
     // What cannot be read is told below.
-    if let Some(bytes) = std::fs::read(place.path()).ok().filter(|bytes| labels::is_tracks(bytes)) {
+    if labels::is_tracks_file(place.path())
+        && let Ok(bytes) = std::fs::read(place.path())
+    {
         let (set, stamps) = of_tracks(args, &bytes)?;
         return write(args, &set, Some(&stamps), overwrite);
     }
@@ -130,27 +133,14 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
             args.input.display()
         )));
     }
-    let frames = match &args.dataset {
-        Some(path) => {
-            let spec = DatasetSpec {
-                path: path.clone(),
-                camera: args.camera.clone(),
-                plugins: args.plugins.spec(),
-                ..DatasetSpec::default()
-            };
-            let dataset = spec.open_raw(&vice_run::formats::registry(&spec.plugins)?)?;
-            let camera = spec.camera_name(dataset.as_ref())?;
-            Some((dataset.name().to_string(), camera.clone(), dataset.frames(&camera)?))
-        }
-        None => None,
-    };
-    let read = labels::read(place.path(), frames.as_ref().map(|(_, _, f)| f.as_ref()));
-    let mut set = place.told(read)?;
-    if let Some((dataset, camera, _)) = &frames {
-        set.dataset.get_or_insert_with(|| dataset.clone());
-        set.camera.get_or_insert_with(|| camera.clone());
+    let frames = args.counted_spec().as_ref().map(Counted::of).transpose()?;
+    let stamps = frames.as_ref().map(|f| f.stamps.as_ref());
+    let mut set = place.told(labels::read(place.path(), stamps))?;
+    if let Some(frames) = &frames {
+        set.dataset.get_or_insert_with(|| frames.dataset.clone());
+        set.camera.get_or_insert_with(|| frames.camera.clone());
     }
-    write(args, &set, frames.as_ref().map(|(_, _, f)| f.as_ref()), overwrite)
+    write(args, &set, stamps, overwrite)
 }
 
 fn write(
