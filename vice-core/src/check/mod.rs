@@ -8,6 +8,7 @@ pub mod camera_difference;
 pub mod clock;
 pub mod coverage;
 mod cures;
+pub mod hand_eye;
 pub mod inertial;
 pub mod motion;
 pub mod optics;
@@ -34,7 +35,7 @@ pub struct Check {
 }
 
 /// All checks, in the order in which they are made.
-pub const CHECKS: [Check; 10] = [
+pub const CHECKS: [Check; 11] = [
     stamps::CHECK,
     coverage::CHECK,
     clock::CHECK,
@@ -43,6 +44,7 @@ pub const CHECKS: [Check; 10] = [
     inertial::GRAVITY,
     path::CHECK,
     optics::CHECK,
+    hand_eye::CHECK,
     pictures::CHECK,
     pictures::DEPTH,
 ];

@@ -8,7 +8,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::frames::rotation_vector_rad;
 use crate::imu::ImuSample;
 use crate::statistics::middle;
-use crate::time::Stamp;
+use crate::time::{Span, Stamp};
 use crate::trajectory::Trajectory;
 
 /// A spacing this many times the usual one is a gap.
@@ -26,6 +26,8 @@ pub struct Turning {
     /// How many gaps lie before each.
     gaps: Vec<u32>,
     spacing_s: f64,
+    /// Whether orientations on both sides of a gap are known against each other: poses are, a chain of turns is not.
+    bridged: bool,
 }
 
 /// An orientation between two that are known, and how many gaps lie before it.
@@ -54,6 +56,36 @@ impl Turning {
         Self::new(rows)
     }
 
+    /// A chain of turns: for each moment the turn since the one before it, `before_from_now`, in its own body; `None` where
+    /// that is not known. `None` for fewer than two moments, or for moments that do not increase.
+    pub fn of_steps(steps: &[(Stamp, Option<UnitQuaternion<f64>>)]) -> Option<Self> {
+        if steps.windows(2).any(|w| w[1].0 <= w[0].0) {
+            return None;
+        }
+        let (mut rotation, mut broken) = (UnitQuaternion::identity(), 0);
+        let (mut rows, mut gaps) = (Vec::with_capacity(steps.len()), Vec::with_capacity(steps.len()));
+        for (i, (stamp, step)) in steps.iter().enumerate() {
+            match step {
+                Some(step) if i > 0 => rotation *= step,
+                _ => broken += u32::from(i > 0),
+            }
+            rows.push((*stamp, rotation));
+            gaps.push(broken);
+        }
+        Some(Self { gaps, bridged: false, ..Self::new(rows)? })
+    }
+
+    /// The same of a frame that is fixed to the body, or moves in it: `body_from_frame` at each moment. Moments for which it
+    /// is not known are left out; `None` for fewer than two.
+    pub fn of_frame(&self, body_from_frame: impl Fn(Stamp) -> Option<UnitQuaternion<f64>>) -> Option<Self> {
+        let stamp = |t: f64| self.origin.saturating_add(Span::from_secs_f64(t).unwrap_or(Span::ZERO));
+        let rows = self.times.iter().zip(&self.rotations).filter_map(|(t, rotation)| {
+            let at = stamp(*t);
+            Some((at, rotation * body_from_frame(at)?))
+        });
+        Self::new(rows.collect())
+    }
+
     fn new(rows: Vec<(Stamp, UnitQuaternion<f64>)>) -> Option<Self> {
         if rows.len() < 2 {
             return None;
@@ -68,7 +100,7 @@ impl Turning {
             gaps[i] = gaps[i - 1] + u32::from(times[i] - times[i - 1] > limit);
         }
         let rotations = rows.into_iter().map(|(_, r)| r).collect();
-        Some(Self { origin, times, rotations, gaps, spacing_s })
+        Some(Self { origin, times, rotations, gaps, spacing_s, bridged: true })
     }
 
     /// Median time between two orientations, seconds.
@@ -78,8 +110,13 @@ impl Turning {
 
     /// First and last stamp.
     pub fn range(&self) -> (Stamp, Stamp) {
-        let span = crate::time::Span::from_secs_f64(self.times[self.times.len() - 1]);
+        let span = Span::from_secs_f64(self.times[self.times.len() - 1]);
         (self.origin, span.map_or(self.origin, |s| self.origin.saturating_add(s)))
+    }
+
+    /// Whether a turn between two of its moments is known across gaps.
+    pub(super) const fn bridges_gaps(&self) -> bool {
+        self.bridged
     }
 
     /// Seconds by which this origin is later than another's.
@@ -150,5 +187,27 @@ mod tests {
         assert!((rate - Vector3::new(0.0, 0.0, 0.5)).norm() < 1e-9, "{rate}");
         assert!(known[2].is_none() && known[4].is_none());
         assert!(Turning::rate(&known[1], &known[3], 2.195).is_none(), "across the gap");
+    }
+
+    #[test]
+    fn a_chain_of_turns_is_not_known_across_what_it_lacks() {
+        let step = UnitQuaternion::from_euler_angles(0.0, 0.0, 0.05);
+        let steps: Vec<_> = (0..20)
+            .map(|i| (Stamp::from_nanos(i * 100_000_000), (i != 0 && i != 10).then_some(step)))
+            .collect();
+        let chain = Turning::of_steps(&steps).unwrap();
+        let known = chain.at([0.1, 0.8, 0.95, 1.0, 1.8].into_iter());
+        let rate = Turning::rate(&known[0], &known[1], 0.7).unwrap();
+        assert!((rate - Vector3::new(0.0, 0.0, 0.5)).norm() < 1e-9, "{rate}");
+        assert!(known[2].is_none(), "nothing is known within the step that is not there");
+        assert!(Turning::rate(&known[1], &known[4], 1.0).is_none());
+        assert!(Turning::rate(&known[3], &known[4], 0.8).is_some());
+        assert!(Turning::of_steps(&[steps[1], steps[0]]).is_none(), "moments increase");
+        // A frame that is turned against the body turns about another axis of its own.
+        let over = UnitQuaternion::from_euler_angles(std::f64::consts::FRAC_PI_2, 0.0, 0.0);
+        let frame = chain.of_frame(|_| Some(over)).unwrap();
+        let known = frame.at([0.1, 0.8].into_iter());
+        let rate = Turning::rate(&known[0], &known[1], 0.7).unwrap();
+        assert!((rate - Vector3::new(0.0, 0.5, 0.0)).norm() < 1e-9, "{rate}");
     }
 }

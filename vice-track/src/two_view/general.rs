@@ -70,6 +70,18 @@ pub(super) fn refined(pairs: &[Pair], start: Motion, half_px: f64) -> Motion {
     best.1
 }
 
+/// How far off a point is changes by this with a turn from the left (three numbers) and with the direction of motion (two
+/// directions across it).
+pub(super) fn row(motion: &Motion, pair: &Pair) -> Vector5<f64> {
+    let [one, two] = across(&motion.along);
+    let (_, by_turn, by_along) = mismatch(motion, pair);
+    five(&by_turn, &by_along, [&one, &two])
+}
+
+fn five(by_turn: &Vector3<f64>, by_along: &Vector3<f64>, [one, two]: [&Vector3<f64>; 2]) -> Vector5<f64> {
+    Vector5::new(by_turn.x, by_turn.y, by_turn.z, by_along.dot(one), by_along.dot(two))
+}
+
 /// One step of Gauss and Newton's method.
 fn step(pairs: &[Pair], motion: &Motion, weight: impl Fn(f64) -> f64) -> Option<Motion> {
     let [one, two] = across(&motion.along);
@@ -77,7 +89,7 @@ fn step(pairs: &[Pair], motion: &Motion, weight: impl Fn(f64) -> f64) -> Option<
     let mut right = Vector5::<f64>::zeros();
     for pair in pairs {
         let (off, by_turn, by_along) = mismatch(motion, pair);
-        let row = Vector5::new(by_turn.x, by_turn.y, by_turn.z, by_along.dot(&one), by_along.dot(&two));
+        let row = five(&by_turn, &by_along, [&one, &two]);
         let w = weight(off.abs() * pair.px_per_rad());
         normal += row * row.transpose() * w;
         right += row * (off * w);

@@ -13,6 +13,7 @@
 mod general;
 mod plane;
 mod turn;
+mod turned;
 
 use nalgebra::{Rotation3, Vector3};
 use vice_core::camera::{Camera, Pixel};
@@ -20,6 +21,7 @@ use vice_core::random::SplitMix;
 use vice_core::statistics::median;
 
 use general::Motion;
+pub use turned::{Turned, turned};
 
 /// With fewer points in both frames nothing is said: five fix the motion, and the others have to outvote it.
 pub const MIN_POINTS: usize = 12;

@@ -15,7 +15,7 @@
 mod coarse;
 mod fit;
 mod parts;
-mod pieces;
+pub(super) mod pieces;
 #[cfg(test)]
 mod tests;
 

@@ -11,16 +11,16 @@ const LEAST_S: f64 = 0.1;
 const MOST_S: f64 = 1.05;
 
 /// Stretches between orientations of the sparser source, and its turn rate over each.
-pub(super) struct Pieces {
+pub(in super::super) struct Pieces {
     /// Ends in seconds since the source's origin.
-    pub(super) ends: Vec<(f64, f64)>,
+    pub(in super::super) ends: Vec<(f64, f64)>,
     /// Mean turn rates in its own body, rad/s.
-    pub(super) rates: Vec<Vector3<f64>>,
+    pub(in super::super) rates: Vec<Vector3<f64>>,
 }
 
 impl Pieces {
     /// Neighbouring stretches, each as short as the source allows.
-    pub(super) fn of(source: &Turning) -> Self {
+    pub(in super::super) fn of(source: &Turning) -> Self {
         let times = source.times();
         let most = MOST_S.max(2.0 * source.spacing_s());
         let mut nodes = vec![times[0]];
@@ -34,8 +34,8 @@ impl Pieces {
         for i in 1..nodes.len() {
             let dt = nodes[i] - nodes[i - 1];
             // The source's own gaps are its stretches here, where they are short enough.
-            let (Some((a, _)), Some((b, _))) = (&known[i - 1], &known[i]) else { continue };
-            if dt <= most {
+            let (Some((a, gaps_a)), Some((b, gaps_b))) = (&known[i - 1], &known[i]) else { continue };
+            if dt <= most && (source.bridges_gaps() || gaps_a == gaps_b) {
                 pieces.ends.push((nodes[i - 1], nodes[i]));
                 pieces.rates.push(crate::frames::rotation_vector_rad(&(a.inverse() * b)) / dt);
             }
@@ -43,7 +43,7 @@ impl Pieces {
         pieces
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(in super::super) fn len(&self) -> usize {
         self.ends.len()
     }
 
@@ -77,7 +77,7 @@ impl Pieces {
 
     /// The turn rates of another source over the same stretches, where `moment` takes a time of this source to one of the
     /// other; `None` where the other is not known.
-    pub(super) fn seen_by(&self, other: &Turning, moment: impl Fn(f64) -> f64) -> Vec<Option<Vector3<f64>>> {
+    pub(in super::super) fn seen_by(&self, other: &Turning, moment: impl Fn(f64) -> f64) -> Vec<Option<Vector3<f64>>> {
         let moments = self.ends.iter().flat_map(|(from, to)| [moment(*from), moment(*to)]);
         let known = other.at(moments);
         let pairs = known.chunks_exact(2).zip(&self.ends);
