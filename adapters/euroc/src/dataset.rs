@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use vice_core::camera::Camera;
+use vice_core::check::Finding;
+use vice_core::check::stamps::nominal;
 use vice_core::dataset::{CloudRef, CloudSource, Dataset, DepthImage, Fact, GROUND_TRUTH, Image};
 use vice_core::error::{DataError, DataResult};
 use vice_core::frames::{Body, BodyFromCamera, Sensor};
@@ -232,6 +234,19 @@ impl Dataset for Sequence {
             .advice(format!("--reference {shown}"))
         }));
         list.into_iter().collect()
+    }
+
+    fn checks(&self) -> Vec<Finding> {
+        let mut found = Vec::new();
+        for camera in &self.cameras {
+            let stamps = camera.listing().map(|l| l.stamps.clone()).unwrap_or_default();
+            let rate = sensor::rate_hz(&camera.folder);
+            found.extend(rate.and_then(|hz| nominal(&camera.name, "frame", &stamps, hz)));
+        }
+        let stamps: Vec<Stamp> = self.imu().map(|s| s.iter().map(|s| s.stamp).collect()).unwrap_or_default();
+        let rate = sensor::rate_hz(&self.folder.join("imu0"));
+        found.extend(rate.and_then(|hz| nominal("imu", "sample", &stamps, hz)));
+        found
     }
 
     fn facts(&self) -> Vec<Fact> {

@@ -103,6 +103,17 @@ pub(crate) fn depth(folder: &Path) -> DataResult<DepthFile> {
     Ok(file)
 }
 
+#[derive(Deserialize)]
+struct RateFile {
+    rate_hz: Option<f64>,
+}
+
+/// The rate that a sensor's folder names, Hz; `None` where it names none, or the file cannot be read: who needs the file
+/// says so.
+pub(crate) fn rate_hz(folder: &Path) -> Option<f64> {
+    optional::<RateFile>(folder).ok()??.rate_hz
+}
+
 fn optional<T: DeserializeOwned>(folder: &Path) -> DataResult<Option<T>> {
     let path = folder.join(SENSOR_FILE);
     if path.is_file() { yaml::read(path).map(Some) } else { Ok(None) }

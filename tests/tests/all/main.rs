@@ -15,6 +15,7 @@ mod blackbird_oracle;
 mod camera_oracle;
 mod cases;
 mod check;
+mod check_images;
 mod commands;
 mod depth_oracle;
 mod detect;

@@ -112,6 +112,7 @@ fn nothing_is_lost_on_the_way() {
     let suspicions = built_in.suspicions();
     assert!(!suspicions.is_empty());
     assert_eq!(through.suspicions(), suspicions);
+    assert_eq!(through.checks(), built_in.checks());
     for path in ["/no/such/folder", folder.path().join("mav0/cam0/data").to_str().unwrap()] {
         let [one, two] = formats.map(|f| f.open(Path::new(path), &options).err().unwrap());
         assert_eq!(

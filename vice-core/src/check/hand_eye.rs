@@ -12,6 +12,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::Check;
 use super::clock::pieces::Pieces;
+use super::least::weight;
 use super::turning::Turning;
 use crate::finding::{Finding, State, short};
 use crate::frames::rotation_vector_rad;
@@ -43,9 +44,6 @@ const QUIET_RAD_S: f64 = 0.02;
 const SECOND_AXIS: f64 = 0.02;
 /// Rounds of counting outliers less.
 const ROUNDS: usize = 15;
-/// Turns count in full up to so many standard deviations, and not at all from so many on.
-const FULL: f64 = 2.5;
-const NONE: f64 = 7.0;
 /// Parts of the recording that are held against each other.
 const PARTS: (usize, usize) = (4, 24);
 const TURNS_A_PART: usize = 5;
@@ -248,11 +246,6 @@ impl Fit {
         }
         (widest, beyond.sqrt())
     }
-}
-
-/// Huber's weight that goes to zero.
-fn weight(deviations: f64) -> f64 {
-    if deviations <= FULL { 1.0 } else { FULL / deviations * ((NONE - deviations) / (NONE - FULL)).max(0.0) }
 }
 
 /// What a camera's rotation is compared with.

@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use super::Check;
 use super::cures::{cures, so_read};
+use super::lever::Swing;
 use super::motion::kept_rms;
 use super::turning::Turning;
 use crate::conventions::{Convention, Given, list_text};
@@ -153,9 +154,8 @@ pub fn inertial(
                 && left.turns < LEFT_TURNS
                 && left.m_s2.is_none_or(|a| a < LEFT_M_S2)
         };
-        if let Some((list, left)) =
-            tried.iter().find(|(list, left)| moves(list, left)).filter(|(_, left)| fits(left))
-        {
+        let best = tried.iter().find(|(list, left)| moves(list, left)).filter(|(_, left)| fits(left));
+        if let Some((list, left)) = best {
             let alike = tried
                 .iter()
                 .filter(|(other, l)| {
@@ -195,6 +195,8 @@ pub fn inertial(
     };
     found.push(numbers(Finding::new(CHECK.name, about, State::Ok, says), &read, "unexplained"));
     found.extend(gravity(name, &read, is_truth));
+    let camera = given.body_from_camera.zip(given.first_frame).and_then(|(at, first)| at(first));
+    found.extend(super::lever::off_imu(name, &stretches.swings(), stretches.step_s, camera));
     found
 }
 
@@ -328,6 +330,12 @@ impl Stretches {
         let turns = kept_rms(each.iter().map(|(own, pose)| (own - bias - pose).norm()).collect()) / size;
         let acceleration = self.dense.then(|| self.acceleration(poses)).flatten();
         Some(Left { turns, m_s2: acceleration.map(|a| a.0), gravity: acceleration.map(|a| a.1) })
+    }
+
+    fn swings(&self) -> Vec<Swing> {
+        let poses = self.read.poses();
+        let dense = self.list.iter().filter(|_| self.dense);
+        dense.map(|s| Swing { poses: s.poses.map(|i| poses[i]), force: s.force }).collect()
     }
 
     /// What is left of the accelerations, and the gravity that fits.

@@ -5,11 +5,15 @@
 //! cannot know says [`State::Unknown`] and why, never that all is well.
 
 pub mod camera_difference;
+pub mod cameras;
 pub mod clock;
 pub mod coverage;
 mod cures;
 pub mod hand_eye;
 pub mod inertial;
+mod least;
+pub mod lever;
+pub mod loops;
 pub mod motion;
 pub mod optics;
 pub mod path;
@@ -35,16 +39,19 @@ pub struct Check {
 }
 
 /// All checks, in the order in which they are made.
-pub const CHECKS: [Check; 11] = [
+pub const CHECKS: [Check; 14] = [
     stamps::CHECK,
     coverage::CHECK,
     clock::CHECK,
     motion::CHECK,
     inertial::CHECK,
     inertial::GRAVITY,
+    lever::CHECK,
+    loops::CHECK,
     path::CHECK,
     optics::CHECK,
     hand_eye::CHECK,
+    cameras::CHECK,
     pictures::CHECK,
     pictures::DEPTH,
 ];

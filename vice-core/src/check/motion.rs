@@ -73,16 +73,16 @@ struct Motions {
     steps: Vec<(usize, usize, Rigid<Body, Body>)>,
 }
 
-/// Whether an estimate moves as a reference does. `offset`: what is added to the estimate's stamps first, where the clock
+/// Whether an estimate moves as a reference does, and of which point its poses are. `offset`: what is added to the estimate's stamps first, where the clock
 /// is known to be off.
 pub fn motion(
     reference: (&str, &Trajectory),
     estimate: (&str, &Trajectory),
     offset: Span,
     given: Given<'_>,
-) -> Finding {
+) -> Vec<Finding> {
     let about = format!("{} / {}", reference.0, estimate.0);
-    let unknown = |says: String| Finding::new(CHECK.name, &about, State::Unknown, says);
+    let unknown = |says: String| vec![Finding::new(CHECK.name, &about, State::Unknown, says)];
     let Some(motions) = Motions::of(reference.1, estimate.1, offset) else {
         return unknown("the two have too few motions in common".to_string());
     };
@@ -97,7 +97,14 @@ pub fn motion(
         )
     };
     if read.turns.unwrap_or(0.0).max(read.way.unwrap_or(0.0)) <= OFF {
-        return fits(&motions, estimate.0, &about, read, numbers);
+        let mut found = vec![fits(&motions, estimate.0, &about, read, numbers)];
+        // Only of bodies that are turned alike, and of one scale.
+        if found.iter().all(|f| f.state == State::Ok) {
+            let camera = given.body_from_camera.zip(given.first_frame).and_then(|(at, first)| at(first));
+            let motions = motions.each(&motions.read);
+            found.extend(super::lever::off_reference(estimate.0, reference.0, motions, camera));
+        }
+        return found;
     }
     let tried = cures(&motions.read, given, TIE, Unexplained::total, |cured| motions.unexplained(cured));
     let best = tried.first().filter(|(_, u)| u.total() < SHARE * read.total() && u.total() < 1.5 * OFF);
@@ -110,16 +117,17 @@ pub fn motion(
         let finding = Finding::new(CHECK.name, about, State::Wrong, says);
         let finding = numbers(numbers(finding, read, "unexplained"), *left, "then-left");
         let frame = if list == &[Convention::CameraAsBody] { ", or `estimate-frame` camera" } else { "" };
-        return finding.mend(format!("`estimate-as` {}{frame}", list_text(list)));
+        return vec![finding.mend(format!("`estimate-as` {}{frame}", list_text(list)))];
     }
     if super::path::is_frozen(&motions.read) && read.turns.is_some() {
         let says = format!("the rotation of {} never changes, and {} turns", estimate.0, reference.0);
         let finding = Finding::new(CHECK.name, about, State::Wrong, says);
-        return numbers(finding, read, "unexplained").mend("write the rotations: no option mends this");
+        let finding = numbers(finding, read, "unexplained");
+        return vec![finding.mend("write the rotations: no option mends this")];
     }
     let says = format!("{} does not move as {} does, and no convention makes it", estimate.0, reference.0);
-    numbers(Finding::new(CHECK.name, about, State::Look, says), read, "unexplained")
-        .mend("see whether both are of one body and one recording")
+    let finding = numbers(Finding::new(CHECK.name, about, State::Look, says), read, "unexplained");
+    vec![finding.mend("see whether both are of one body and one recording")]
 }
 
 /// What is to be said of an estimate that moves as the reference does.
@@ -288,7 +296,8 @@ mod tests {
         });
         let at = |_: Stamp| Some(extrinsics());
         let given = Given { body_from_camera: Some(&at), first_frame: None };
-        motion(("truth", &reference), ("est", &noisy.map_poses(|_, p| misread(p))), Span::ZERO, given)
+        let noisy = noisy.map_poses(|_, p| misread(p));
+        motion(("truth", &reference), ("est", &noisy), Span::ZERO, given).remove(0)
     }
 
     #[test]

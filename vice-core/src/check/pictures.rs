@@ -18,8 +18,8 @@ pub const CHECK: Check = Check {
 pub const DEPTH: Check = Check {
     name: "depth",
     title: "depth images and floor (with --images)",
-    looks_at: "share of valid depths, their unit, edges of depth against edges of the image, the floor plane against depth and cloud",
-    threshold: "wrong: a unit that no depth camera has; look: less than 20 % valid, depth edges that fit best 4 px or more beside the image's, a floor 5 cm or 3 degrees off the one that is fitted",
+    looks_at: "share of valid depths, their unit, edges of depth against edges of the image, the floor plane against depth and cloud, depth images against the cloud",
+    threshold: "wrong: a unit that no depth camera has, depths that are all 20 % off those of the cloud, a unit or place of the cloud that makes both agree; look: 4 %, surfaces that do not agree, less than 20 % valid, depth edges that fit best 4 px or more beside the image's, a floor 5 cm or 3 degrees off the one that is fitted",
     source: "REP 118; registration to the colour camera; vice floor fit",
 };
 

@@ -10,7 +10,7 @@ pub const CHECK: Check = Check {
     name: "stamps",
     title: "stamps",
     looks_at: "rate, gaps, drops and jitter of the stamps of frames, poses and inertial samples",
-    threshold: "look where a regular source lacks more than 2 % of its samples, or has a gap of more than ten times its spacing and half a second",
+    threshold: "look where a regular source lacks more than 2 % of its samples, has a gap of more than ten times its spacing and half a second, or is more than 2 % off the rate that its format names",
     source: "spacing of a triggered sensor; key frames and other irregular sources have no rate to be held to",
 };
 
@@ -23,6 +23,37 @@ const DROPS: f64 = 0.02;
 /// A gap is long above this many spacings, and above this many seconds.
 const LONG_TIMES: f64 = 10.0;
 const LONG_S: f64 = 0.5;
+
+/// A rate may be off the one that is named by this share.
+const RATE: f64 = 0.02;
+/// From so many times the named spacing on, samples were left out on purpose.
+const LEFT_OUT: f64 = 1.5;
+
+/// The rate of a source against the one that its format names, Hz; nothing for fewer than ten samples, or a rate that is
+/// none. For formats' own checks.
+pub fn nominal(about: &str, what: &str, stamps: &[Stamp], rate_hz: f64) -> Option<Finding> {
+    if stamps.len() < 10 || !(rate_hz.is_finite() && rate_hz > 0.0) {
+        return None;
+    }
+    let spacings: Vec<f64> = stamps.windows(2).map(|w| w[1].since(w[0]).as_secs_f64()).collect();
+    let usual = quantile(&sorted(spacings), 0.5).filter(|s| *s > 0.0)?;
+    let hz = 1.0 / usual;
+    let (state, says) = match hz / rate_hz {
+        share if share < 1.0 / LEFT_OUT => {
+            (State::Ok, format!("{hz:.2} Hz of the {rate_hz} Hz that are named: a selection of the {what}s"))
+        }
+        share if (share - 1.0).abs() > RATE => {
+            (State::Look, format!("the {what}s come at {hz:.2} Hz, and {rate_hz} Hz are named"))
+        }
+        _ => (State::Ok, format!("the {what}s come at the rate that is named, {rate_hz} Hz")),
+    };
+    let finding =
+        Finding::new(CHECK.name, about, state, says).number("rate", hz, "Hz").number("named", rate_hz, "Hz");
+    Some(match state {
+        State::Look => finding.mend("see whether stamps were made from a wrong frame rate: `vice check` compares the clocks"),
+        _ => finding,
+    })
+}
 
 /// What the stamps of a source are like. `what` is a word for one: frame, pose, sample.
 pub fn stamps(about: &str, what: &str, stamps: &[Stamp]) -> Finding {
@@ -101,6 +132,19 @@ pub fn stamps(about: &str, what: &str, stamps: &[Stamp]) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_rate_is_held_to_the_one_that_is_named() {
+        let at = |hz: f64| -> Vec<Stamp> {
+            (0..50).map(|i| Stamp::from_nanos((f64::from(i) * 1e9 / hz) as i64)).collect()
+        };
+        let said = |hz: f64, named: f64| nominal("cam0", "frame", &at(hz), named).map(|f| f.state);
+        assert_eq!([said(20.0, 20.0), said(20.1, 20.0)], [Some(State::Ok); 2]);
+        assert_eq!([said(21.0, 20.0), said(19.0, 20.0), said(200.0, 100.0)], [Some(State::Look); 3]);
+        // Every tenth frame, and key frames.
+        assert_eq!(said(2.0, 20.0), Some(State::Ok));
+        assert_eq!([said(20.0, 0.0), said(20.0, f64::NAN)], [None; 2]);
+    }
 
     fn at(millis: impl Iterator<Item = i64>) -> Vec<Stamp> {
         millis.map(|m| Stamp::from_nanos(m * 1_000_000)).collect()

@@ -114,6 +114,12 @@ impl Turning {
         (self.origin, span.map_or(self.origin, |s| self.origin.saturating_add(s)))
     }
 
+    /// By how much it turns between each two neighbours of moments that increase, radians; `None` where that is not known.
+    pub fn steps_rad(&self, stamps: &[Stamp]) -> Vec<Option<f64>> {
+        let known = self.at(stamps.iter().map(|s| s.since(self.origin).as_secs_f64()));
+        known.windows(2).map(|pair| Some(Self::rate(&pair[0], &pair[1], 1.0)?.norm())).collect()
+    }
+
     /// Whether a turn between two of its moments is known across gaps.
     pub(super) const fn bridges_gaps(&self) -> bool {
         self.bridged

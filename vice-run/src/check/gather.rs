@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use vice_core::check::clock::{ClockDoubt, ClockOffset, clock_offset};
 use vice_core::check::turning::Turning;
-use vice_core::check::{Finding, State, clock, coverage, inertial, motion, optics, path, stamps};
+use vice_core::check::{Finding, State, clock, coverage, inertial, loops, motion, optics, path, stamps};
 use vice_core::conventions::Given;
 use vice_core::dataset::{Dataset, GROUND_TRUTH};
 use vice_core::error::{ErrorKind, one_line};
@@ -17,6 +17,7 @@ use vice_core::trajectory::Trajectory;
 
 use super::CheckRequest;
 use super::images::{self, World3d};
+use super::{cloud, stereo, turns};
 use crate::error::{RunError, RunResult};
 use crate::open::Opened;
 
@@ -219,16 +220,31 @@ impl Gathered {
     }
 
     fn pictures(&self, found: &mut Vec<Finding>) {
-        let anchor = self.streams.iter().find(|s| s.is_reference).map(|s| &s.trajectory);
-        for camera in &self.cameras {
-            found.extend(images::look(
-                self.dataset.as_ref(),
-                camera,
-                &World3d { anchor, max_gap: self.max_gap },
-            ));
-        }
         if self.cameras.is_empty() {
             found.push(Finding::new("images", "", State::Unknown, "there is no camera"));
+        }
+        let anchor = self.streams.iter().find(|s| s.is_reference).map(|s| &s.trajectory);
+        let world = World3d { anchor, max_gap: self.max_gap };
+        let scan = cloud::read(self.dataset.as_ref(), found);
+        for camera in &self.cameras {
+            found.extend(images::look(self.dataset.as_ref(), camera, &world, scan.as_ref()));
+        }
+        let turnings: Vec<Option<Turning>> =
+            self.streams.iter().map(|s| Turning::of_poses(&s.trajectory)).collect();
+        let gyro = Turning::of_gyro(&self.imu);
+        let gyro =
+            gyro.as_ref().map(|turning| turns::Source { name: IMU, turning, is_body: true, is_gyro: true });
+        let streams = self.streams.iter().zip(&turnings).filter_map(|(stream, turning)| {
+            let turning = turning.as_ref()?;
+            Some(turns::Source { name: &stream.name, turning, is_body: stream.is_truth, is_gyro: false })
+        });
+        let sources: Vec<turns::Source<'_>> = gyro.into_iter().chain(streams).collect();
+        for camera in &self.cameras {
+            found.extend(turns::look(self.dataset.as_ref(), camera, &sources));
+        }
+        // Each against the first one: others follow.
+        if let Some((first, others)) = self.cameras.split_first() {
+            found.extend(others.iter().filter_map(|c| stereo::look(self.dataset.as_ref(), first, c)));
         }
     }
 
@@ -286,13 +302,10 @@ impl Gathered {
         };
         for stream in self.streams.iter().filter(|s| !s.is_reference) {
             let offset = offsets.of(&reference.name, &stream.name);
-            let finding = motion::motion(
-                (&reference.name, &reference.trajectory),
-                (&stream.name, &stream.trajectory),
-                offset,
-                given,
-            );
-            found.push(finding);
+            let (truth, own) =
+                ((&*reference.name, &reference.trajectory), (&*stream.name, &stream.trajectory));
+            found.extend(motion::motion(truth, own, offset, given));
+            found.extend(loops::loops(truth, own, offset));
         }
     }
 

@@ -8,9 +8,9 @@ use vice_core::dataset::{Dataset, Floor, Plane, depth_unit_doubt};
 use vice_core::frames::World;
 use vice_core::time::Span;
 use vice_core::trajectory::Trajectory;
-use vice_depth::{
-    CloudOptions, FloorFit, FloorFitOptions, fit_floor_to_cloud, fit_floor_to_depth_image, load_cloud,
-};
+use vice_depth::{FloorFit, FloorFitOptions, fit_floor_to_cloud, fit_floor_to_depth_image};
+
+use super::cloud::{self, Scan};
 
 /// Places of the recording that are looked at; at each two neighbouring frames.
 const PLACES: usize = 12;
@@ -32,7 +32,12 @@ pub(super) struct World3d<'a> {
 }
 
 /// Findings about the pictures of a camera.
-pub(super) fn look(dataset: &dyn Dataset, camera: &str, world: &World3d<'_>) -> Vec<Finding> {
+pub(super) fn look(
+    dataset: &dyn Dataset,
+    camera: &str,
+    world: &World3d<'_>,
+    scan: Option<&Scan>,
+) -> Vec<Finding> {
     let Ok(frames) = dataset.frames(camera) else { return Vec::new() };
     if frames.len() < 2 {
         return vec![Finding::new("images", camera, State::Unknown, "there are no two frames to compare")];
@@ -63,10 +68,11 @@ pub(super) fn look(dataset: &dyn Dataset, camera: &str, world: &World3d<'_>) -> 
             found.push(Finding::new(DEPTH.name, camera, State::Wrong, says).mend(doubt.advice));
         }
         found.extend(floor_by_depth(dataset, camera, &places, world));
+        found.extend(scan.and_then(|scan| cloud::against_depth(dataset, camera, &places, world, scan)));
     }
     // The cloud is the same for all cameras.
     if dataset.cameras().first().is_none_or(|first| first == camera) {
-        found.extend(floor_by_cloud(dataset, camera));
+        found.extend(scan.and_then(|scan| floor_by_cloud(dataset, camera, scan)));
     }
     found
 }
@@ -159,19 +165,37 @@ fn floor_by_depth(
     Some(compared(camera, "depth images", &floor, &sorted[sorted.len() / 2], "vice floor fit --at"))
 }
 
-fn floor_by_cloud(dataset: &dyn Dataset, camera: &str) -> Option<Finding> {
+fn floor_by_cloud(dataset: &dyn Dataset, camera: &str, scan: &Scan) -> Option<Finding> {
     let floor = world_floor(dataset, camera)?;
-    let reference = dataset.cloud().ok().flatten()?;
-    let cloud = load_cloud(&reference, &CloudOptions::default()).ok()?;
     let options = FloorFitOptions::default();
-    match fit_floor_to_cloud(&cloud, &reference.world_from_cloud, Vector3::z_axis(), &options) {
+    let fit = |up| fit_floor_to_cloud(&scan.cloud, &scan.reference.world_from_cloud, up, &options);
+    match fit(Vector3::z_axis()) {
         Ok(fit) if fit.inliers as f64 > 0.02 * fit.points as f64 => {
             Some(compared(camera, "cloud", &floor, &fit, "vice floor fit"))
         }
         Ok(_) => Some(Finding::new(DEPTH.name, camera, State::Unknown, "the cloud shows no floor")),
         Err(error) => {
-            let says = format!("no level floor is found in the cloud: {error}");
-            Some(Finding::new(DEPTH.name, camera, State::Look, says).mend("is its world z up?"))
+            // A floor about another axis: that one is up.
+            let others = [
+                (Vector3::y_axis(), "y"),
+                (-Vector3::y_axis(), "-y"),
+                (Vector3::x_axis(), "x"),
+                (-Vector3::x_axis(), "-x"),
+                (-Vector3::z_axis(), "-z"),
+            ];
+            let share = |fit: &FloorFit| fit.inliers as f64 / fit.points.max(1) as f64;
+            let floors = others.into_iter().filter_map(|(up, word)| Some((fit(up).ok()?, word)));
+            let best = floors.max_by(|a, b| share(&a.0).total_cmp(&share(&b.0)));
+            let says = match best.filter(|(fit, _)| share(fit) > FLOOR_SHARE) {
+                Some((fit, word)) => format!(
+                    "no floor of the cloud is level about z, and {:.0} % of its points lie on one whose up is {word}: its world is not z up",
+                    100.0 * share(&fit)
+                ),
+                None => format!("no level floor is found in the cloud: {error}"),
+            };
+            Some(Finding::new(DEPTH.name, camera, State::Look, says).mend(
+                "turn the cloud and the poses into a world whose z points up (`estimate-as` y-up for poses), or give the floor with `floor-plane`",
+            ))
         }
     }
 }

@@ -5,10 +5,13 @@
 
 mod calibration_diff;
 mod clock;
+mod cloud;
 mod gather;
 mod images;
 mod page;
+mod stereo;
 mod text;
+mod turns;
 
 use std::path::PathBuf;
 use std::sync::Arc;

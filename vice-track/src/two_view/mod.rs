@@ -10,6 +10,7 @@
 //! What this cannot see: an error along the epipolar line, and things that move in the scene where most points are on
 //! them.
 
+mod follow;
 mod general;
 mod plane;
 mod turn;
@@ -21,6 +22,8 @@ use vice_core::random::SplitMix;
 use vice_core::statistics::median;
 
 use general::Motion;
+
+pub use follow::{between, followed};
 pub use turned::{Turned, turned};
 
 /// With fewer points in both frames nothing is said: five fix the motion, and the others have to outvote it.

@@ -34,6 +34,9 @@ pub struct Turned {
     pub sd_rad: f64,
     /// [`Moved::Turn`] or [`Moved::General`].
     pub moved: Moved,
+    /// Where it moved, of length one: a point of the first frame is seen at `turn * point + along * some length` in the
+    /// second. `None` where it only turned.
+    pub along: Option<Vector3<f64>>,
     /// Points that follow.
     pub follow: usize,
 }
@@ -58,15 +61,21 @@ pub fn turned(pairs: &[Pair], seed: u64) -> Option<Turned> {
     if follow.len() < FEWEST || found.left_over() as f64 > ASTRAY * pairs.len() as f64 {
         return None;
     }
-    let sd_rad = match found.moved {
-        Moved::Turn => turn_sd_rad(&follow, &turn, turn_px)?,
-        _ if before(&follow, &motion, general_px) < BEFORE => return None,
-        _ => general_sd_rad(&follow, &motion, general_px)?,
+    let (sd_rad, along) = match found.moved {
+        Moved::Turn => (turn_sd_rad(&follow, &turn, turn_px)?, None),
+        _ => {
+            let before = before(&follow, &motion, general_px);
+            if before.abs() < BEFORE {
+                return None;
+            }
+            (general_sd_rad(&follow, &motion, general_px)?, Some(motion.along * before.signum()))
+        }
     };
     Some(Turned {
         second_from_first: turn,
         sd_rad: sd_rad.hypot(LEAST_SD_RAD),
         moved: found.moved,
+        along,
         follow: follow.len(),
     })
 }
@@ -82,7 +91,7 @@ fn motion(pairs: &[Pair], turn: Rotation3<f64>, random: &mut SplitMix) -> Option
         if best.as_ref().is_some_and(|(least, _)| cost >= *least) {
             continue;
         }
-        let worse = if before(pairs, &motion, 0.3) < BEFORE { BEHIND } else { 1.0 };
+        let worse = if before(pairs, &motion, 0.3).abs() < BEFORE { BEHIND } else { 1.0 };
         if best.as_ref().is_none_or(|(least, _)| worse * cost < *least) {
             best = Some((worse * cost, motion));
         }
@@ -90,8 +99,8 @@ fn motion(pairs: &[Pair], turn: Rotation3<f64>, random: &mut SplitMix) -> Option
     best.map(|(_, motion)| general::refined(pairs, motion, SEARCH_PX))
 }
 
-/// Share of the points with a parallax above the noise that lie on the more frequent side: the direction of motion has no
-/// sign. 1 where there is no parallax.
+/// Share of the points with a parallax above the noise that lie on the more frequent side of the camera: negative where
+/// that is behind, so that the motion is to be turned round. 1 where there is no parallax.
 fn before(pairs: &[Pair], motion: &Motion, noise_px: f64) -> f64 {
     let (mut one, mut other) = (0.0, 0.0);
     for pair in pairs {
@@ -103,7 +112,11 @@ fn before(pairs: &[Pair], motion: &Motion, noise_px: f64) -> f64 {
         }
         if parallax.dot(&along) > 0.0 { one += 1.0 } else { other += 1.0 }
     }
-    if one + other > 0.0 { f64::max(one, other) / (one + other) } else { 1.0 }
+    match one + other {
+        all if all > 0.0 && one >= other => one / all,
+        all if all > 0.0 => -other / all,
+        _ => 1.0,
+    }
 }
 
 fn turn_sd_rad(pairs: &[Pair], turn: &Rotation3<f64>, noise_px: f64) -> Option<f64> {
@@ -134,4 +147,63 @@ fn general_sd_rad(pairs: &[Pair], motion: &Motion, noise_px: f64) -> Option<f64>
 fn largest_sd(covariance: &Matrix3<f64>) -> Option<f64> {
     let sd = covariance.symmetric_eigenvalues().max().max(0.0).sqrt();
     sd.is_finite().then_some(sd)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Sight;
+    use super::*;
+
+    /// Points of a room in two frames with noise in the second one, and some wrong ones.
+    fn pairs(turn: Vector3<f64>, moved: Vector3<f64>, count: usize, seed: u64) -> Vec<Pair> {
+        let mut random = SplitMix::new(seed);
+        let turn = Rotation3::new(turn);
+        let sight = |p: &Vector3<f64>| Sight { ray: p.normalize(), px_per_rad: 450.0 / p.normalize().z };
+        (0..count)
+            .map(|i| {
+                let (x, y) = (random.uniform(-0.7, 0.7), random.uniform(-0.5, 0.5));
+                let there = turn * (Vector3::new(x, y, 1.0) * random.uniform(1.0, 6.0)) + moved;
+                let size = if i % 9 == 4 { 8.0 } else { 0.15 };
+                let noise = Vector3::new(random.normal(), random.normal(), 0.0) * (size / 450.0);
+                Pair { from: sight(&Vector3::new(x, y, 1.0)), to: sight(&(there / there.z + noise)) }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn turns_are_found_within_what_is_said_of_them() {
+        let turn = Vector3::new(0.02, -0.05, 0.03);
+        for (moved, kind) in [
+            (Vector3::zeros(), Moved::Turn),
+            (Vector3::new(0.1, 0.02, -0.05), Moved::General),
+            (Vector3::new(0.0, 0.0, 0.2), Moved::General),
+        ] {
+            let mut inside = 0;
+            for seed in 0..20 {
+                let found = turned(&pairs(turn, moved, 150, seed), 7).unwrap();
+                let off = (found.second_from_first * Rotation3::new(turn).inverse()).angle();
+                // Three axes, each within its own standard deviation at most.
+                inside += i32::from(off < 3.0 * found.sd_rad);
+                assert!(found.sd_rad < 5e-3 && off < 8e-3, "{moved}: {off} {found:?}");
+                assert_eq!(found.moved, kind, "{moved}: {found:?}");
+                if let Some(along) = found.along {
+                    assert!(along.angle(&moved) < 0.2, "{moved}: {along}");
+                }
+            }
+            assert!(inside >= 17, "{moved}: {inside} of 20");
+        }
+    }
+
+    #[test]
+    fn what_does_not_move_as_one_is_not_measured() {
+        let turn = Vector3::new(0.02, -0.05, 0.03);
+        assert_eq!(turned(&pairs(turn, Vector3::zeros(), 19, 1), 7), None);
+        let mut random = SplitMix::new(9);
+        let mut chaos = pairs(turn, Vector3::zeros(), 100, 2);
+        for pair in &mut chaos {
+            let off = Vector3::new(random.normal(), random.normal(), 0.0) * 0.05;
+            pair.to.ray = (pair.to.ray + off).normalize();
+        }
+        assert_eq!(turned(&chaos, 7), None);
+    }
 }

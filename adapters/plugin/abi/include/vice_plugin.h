@@ -95,6 +95,12 @@ extern "C" {
 #define VICE_FLOOR_WORLD 0
 #define VICE_FLOOR_BODY 1 /* in the body at the key frame, as of a robot that stands on it */
 
+/* States of a finding. */
+#define VICE_STATE_UNKNOWN 0 /* there was nothing to look at, or it does not suffice: no praise */
+#define VICE_STATE_OK 1      /* looked at, and as it should be */
+#define VICE_STATE_LOOK 2    /* may make numbers wrong: a person should look */
+#define VICE_STATE_WRONG 3   /* is wrong, or the data contradicts itself */
+
 /* Levels of a line to the user. */
 #define VICE_LOG_ERROR 1
 #define VICE_LOG_WARN 2
@@ -325,6 +331,31 @@ typedef struct vice_suspicions {
     void *owner;
 } vice_suspicions;
 
+/* A number behind a finding. */
+typedef struct vice_number {
+    vice_text name; /* a-z, 0-9, % and - */
+    double value;   /* finite */
+    vice_text unit; /* empty for shares and counts */
+} vice_number;
+
+/* What a check of the format found, for `vice check`. */
+typedef struct vice_finding {
+    vice_text check; /* name of the check: a-z, 0-9 and - */
+    vice_text about; /* a stream, a camera; empty: the whole data set */
+    vice_text says;  /* what was found, in a sentence */
+    vice_text mend;  /* what mends it, or empty */
+    const vice_number *numbers;
+    size_t number_count;
+    int32_t state;     /* VICE_STATE_... */
+    uint32_t reserved; /* 0 */
+} vice_finding;
+
+typedef struct vice_findings {
+    const vice_finding *findings;
+    size_t count;
+    void *owner;
+} vice_findings;
+
 /* What a plugin hands over. */
 typedef struct vice_plugin_table {
     uint32_t abi_version; /* VICE_ABI_VERSION */
@@ -382,6 +413,9 @@ typedef struct vice_plugin_table {
                           vice_message *message);
     /* Since version 2, optional: what looked wrong when the data set was opened and read so far, each once. Asked after reading. */
     int32_t (*suspicions)(void *dataset, vice_suspicions *suspicions, vice_message *message);
+    /* Optional, and behind the end of the table that older programs of version 2 know: what the format's own checks find. Nothing
+     * large is read for it. */
+    int32_t (*checks)(void *dataset, vice_findings *findings, vice_message *message);
 } vice_plugin_table;
 
 #if defined(_WIN32)

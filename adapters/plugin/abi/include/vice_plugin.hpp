@@ -85,6 +85,23 @@ struct Suspicion {
     std::uint64_t count = 1;  // how often the same was seen
 };
 
+// A number behind a finding.
+struct Number {
+    std::string name;  // a-z, 0-9, % and -
+    double value = 0.0;
+    std::string unit;  // empty for shares and counts
+};
+
+// What a check of the format found, for `vice check`.
+struct Finding {
+    std::string check;  // name of the check: a-z, 0-9 and -
+    std::string about;  // a stream, a camera; empty: the whole data set
+    std::int32_t state = VICE_STATE_UNKNOWN;
+    std::string says;  // what was found, in a sentence
+    std::vector<Number> numbers;
+    std::string mend;  // what mends it, or empty
+};
+
 struct SettingInfo {
     std::string key;
     std::string description;
@@ -135,6 +152,8 @@ class Dataset {
     virtual std::vector<Fact> facts() { return {}; }
     // What looked wrong so far, each once. Asked after the data was read.
     virtual std::vector<Suspicion> suspicions() { return {}; }
+    // What the format's own checks find. Nothing large is to be read for it.
+    virtual std::vector<Finding> checks() { return {}; }
 };
 
 // A format. One object is made, once, and never destroyed.

@@ -332,6 +332,32 @@ struct Export {
         });
     }
 
+    struct HeldFindings {
+        std::vector<Finding> own;
+        std::vector<std::vector<vice_number>> numbers;
+        std::vector<vice_finding> findings;
+    };
+
+    static std::int32_t checks(void *dataset, vice_findings *out, vice_message *message) noexcept {
+        return guard(message, [&] {
+            auto held = std::make_unique<Holder<HeldFindings>>(HeldFindings{of(dataset).dataset->checks(), {}, {}});
+            auto &value = held->value;
+            for (const Finding &f : value.own) {
+                value.numbers.emplace_back();
+                for (const Number &n : f.numbers) value.numbers.back().push_back({text(n.name), n.value, text(n.unit)});
+            }
+            for (std::size_t i = 0; i < value.own.size(); ++i) {
+                const Finding &f = value.own[i];
+                value.findings.push_back({text(f.check), text(f.about), text(f.says), text(f.mend), value.numbers[i].data(),
+                                          value.numbers[i].size(), f.state, 0});
+            }
+            out->findings = value.findings.data();
+            out->count = value.findings.size();
+            out->owner = token(held.release());
+            return VICE_OK;
+        });
+    }
+
     // What the table points at.
     struct Texts {
         std::string name, version, description;
@@ -383,6 +409,7 @@ struct Export {
         t.facts = &facts;
         t.image_file = &image_file;
         t.suspicions = &suspicions;
+        t.checks = &checks;
         // Lives as long as the library, which is never unloaded.
         return &texts.release()->table;
     }

@@ -39,7 +39,8 @@ answers!(
     ImuSamples,
     Cloud,
     Facts,
-    Suspicions
+    Suspicions,
+    Findings
 );
 
 macro_rules! plain_answers {

@@ -12,6 +12,7 @@ use vice_core::dataset::{
 use vice_core::error::{DataError, DataResult, one_line};
 use vice_core::frames::BodyFromCamera;
 use vice_core::imu::{ImuSample, InertialState};
+use vice_core::finding::{Finding, State};
 use vice_core::suspicion::Suspicion;
 use vice_core::time::Stamp;
 use vice_core::trajectory::Trajectory;
@@ -309,6 +310,29 @@ impl Dataset for PluginDataset {
         // What a plugin fails to say must not be taken for all being well.
         suspicions.map_or_else(
             |error| vec![Suspicion::new("plugin-fault", self.format(), one_line(&error))],
+            Option::unwrap_or_default,
+        )
+    }
+
+    fn checks(&self) -> Vec<Finding> {
+        let Some(call) = self.library.calls.optional.checks else { return Vec::new() };
+        let findings = ask(
+            &self.library,
+            &|| "checks".to_string(),
+            // SAFETY: an open data set.
+            |out, message| unsafe { call(self.handle.raw(), out, message) },
+            |list: &contract::Findings| {
+                // SAFETY: the plugin's promise.
+                let list = unsafe { border::list(list.findings, list.count, "findings") }?;
+                // SAFETY: the plugin's promise.
+                list.iter().map(|f| unsafe { values::finding(f) }).collect()
+            },
+        );
+        findings.map_or_else(
+            |error| {
+                let says = format!("its own checks failed: {}", one_line(&error));
+                vec![Finding::new("plugin-fault", self.format(), State::Look, says)]
+            },
             Option::unwrap_or_default,
         )
     }

@@ -68,6 +68,7 @@ pub(crate) struct Optional {
     pub(crate) facts: Option<contract::Call<contract::Facts>>,
     pub(crate) image_file: Option<contract::FrameCall<contract::ImageFile>>,
     pub(crate) suspicions: Option<contract::Call<contract::Suspicions>>,
+    pub(crate) checks: Option<contract::Call<contract::Findings>>,
 }
 
 impl Plugin {
@@ -279,6 +280,7 @@ fn calls(table: &PluginTable) -> Result<Calls, Fault> {
             facts: table.facts,
             image_file: table.image_file,
             suspicions: table.suspicions,
+            checks: table.checks,
         },
     })
 }

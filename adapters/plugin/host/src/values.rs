@@ -6,6 +6,7 @@ use vice_core::camera::{Camera, Model};
 use vice_core::dataset::{DepthImage, Floor, Image, PixelFormat, Plane};
 use vice_core::frames::Rigid;
 use vice_core::imu::{self, ImuSample, InertialState};
+use vice_core::finding::{Finding, State};
 use vice_core::suspicion::Suspicion;
 use vice_core::time::Stamp;
 use vice_core::trajectory::{RelativeMotion, Trajectory};
@@ -237,6 +238,44 @@ pub(crate) unsafe fn suspicion(given: &contract::Suspicion) -> Result<Suspicion,
         return Err(format!("the suspicion `{code}` has no message, or was seen 0 times"));
     }
     Ok(Suspicion::new(&code, about, message).evidence(evidence).advice(advice).times(given.count))
+}
+
+/// # Safety
+/// Its texts and numbers are as [`border`] wants them.
+#[allow(unsafe_code)]
+pub(crate) unsafe fn finding(given: &contract::Finding) -> Result<Finding, Fault> {
+    // SAFETY: the caller's promise, for all of these.
+    let (check, about, says, mend, numbers) = unsafe {
+        (
+            border::name(given.check, "the name of a check")?,
+            border::text(given.about, "what a finding is about")?,
+            border::text(given.says, "what a finding says")?,
+            border::text(given.mend, "what mends a finding")?,
+            border::list(given.numbers, given.number_count, "numbers of a finding")?,
+        )
+    };
+    let state = match given.state {
+        contract::STATE_UNKNOWN => State::Unknown,
+        contract::STATE_OK => State::Ok,
+        contract::STATE_LOOK => State::Look,
+        contract::STATE_WRONG => State::Wrong,
+        other => return Err(format!("state {other} of the finding `{check}` is none of the contract's")),
+    };
+    if says.trim().is_empty() {
+        return Err(format!("the finding `{check}` says nothing"));
+    }
+    let mut finding = Finding::new(&check, about, state, says).mend(mend);
+    for number in numbers {
+        // SAFETY: the caller's promise.
+        let (name, unit) = unsafe {
+            (border::name(number.name, "the name of a number")?, border::text(number.unit, "a unit")?)
+        };
+        if !number.value.is_finite() {
+            return Err(format!("the number `{name}` of the finding `{check}` is not finite"));
+        }
+        finding = finding.number(&name, number.value, &unit);
+    }
+    Ok(finding)
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@ mod parts;
 pub(super) mod pieces;
 #[cfg(test)]
 mod tests;
+mod words;
 
 use nalgebra::UnitQuaternion;
 
@@ -25,18 +26,17 @@ use self::coarse::{Lags, correlate};
 use self::fit::{Fit, What, fit};
 use self::parts::Change;
 use self::pieces::Pieces;
+pub use self::words::{finding, images_finding};
 use super::Check;
 use super::turning::Turning;
-use crate::finding::short;
-use crate::finding::{Finding, State};
 use crate::time::{Span, Stamp};
 
 /// What this check is.
 pub const CHECK: Check = Check {
     name: "clock",
     title: "clocks of motion sources",
-    looks_at: "offset and rate between the clocks of gyroscope and pose streams, by their turn rates",
-    threshold: "look above 4 ms, wrong above 10 ms beyond the 95 % interval; rates that add up to as much",
+    looks_at: "offset and rate between the clocks of gyroscope, pose streams and images, by their turn rates",
+    threshold: "look above 4 ms, wrong above 10 ms beyond the 95 % interval; rates that add up to as much; for the stamps of images (with --images) above 10 and 20 ms",
     source: "rigid-body kinematics; Mair et al., ROBIO 2011; interval by blocks of 5 s",
 };
 
@@ -53,9 +53,6 @@ const WIDEST_SHARE: f64 = 0.1;
 const SPARSEST_S: f64 = 0.3;
 /// Lags that are looked at, seconds to either side: few where these suffice.
 const RANGES_S: [f64; 2] = [2.0, 20.0];
-/// Offsets beyond their interval by more than these are worth a look, or wrong, seconds.
-const LOOK_S: f64 = 0.004;
-const WRONG_S: f64 = 0.010;
 
 /// By how much a clock differs from another one.
 #[derive(Clone, Debug, PartialEq)]
@@ -349,73 +346,5 @@ impl ClockOffset {
     /// By how much the offset changes over what both have in common, seconds.
     pub fn grows_s(&self) -> f64 {
         self.rate.map_or(0.0, |r| r.share * self.seconds)
-    }
-}
-
-/// The finding about an estimate's clock against a reference's.
-pub fn finding(reference: &str, estimate: &str, found: &Result<ClockOffset, ClockDoubt>) -> Finding {
-    let about = format!("{reference} / {estimate}");
-    let found = match found {
-        Ok(found) => found,
-        Err(doubt @ ClockDoubt::Step { before_s, after_s, .. }) => {
-            let says = format!("the clock of {estimate} or of {reference} was set: {doubt}");
-            return Finding::new(CHECK.name, about, State::Wrong, says)
-                .number("before", 1e3 * before_s, "ms")
-                .number("after", 1e3 * after_s, "ms")
-                .mend("no constant offset mends a step: correct the stamps at their source, or use one part with `start` and `duration`");
-        }
-        Err(doubt) => return Finding::new(CHECK.name, about, State::Unknown, doubt.to_string()),
-    };
-    let beyond = (found.offset_s.abs() - found.half_95_s).max(0.0);
-    let certain = found.rate.map_or(0.0, |r| (r.share.abs() - r.half_95).max(0.0) * found.seconds);
-    let state = match beyond.max(certain) {
-        s if s > WRONG_S => State::Wrong,
-        s if s > LOOK_S => State::Look,
-        _ => State::Ok,
-    };
-    let ms = 1e3 * found.offset_s;
-    let words = match state {
-        State::Ok => format!(
-            "the clocks agree within {} ms",
-            short((1e2 * (ms.abs() + 1e3 * found.half_95_s)).round() / 1e2)
-        ),
-        _ if beyond > LOOK_S => {
-            let late = if found.offset_s < 0.0 { "late" } else { "early" };
-            let moves = match certain > LOOK_S {
-                true => format!(
-                    ", and the offset moves by {:.1} ms in {:.0} s",
-                    1e3 * found.grows_s(),
-                    found.seconds
-                ),
-                false => String::new(),
-            };
-            format!("the stamps of {estimate} are {:.1} ms {late} against {reference}{moves}", ms.abs())
-        }
-        _ => format!(
-            "the clock of {estimate} runs at another rate than that of {reference}: the offset moves by {:.1} ms in {:.0} s",
-            1e3 * found.grows_s(),
-            found.seconds
-        ),
-    };
-    let mut finding = Finding::new(CHECK.name, about, state, words)
-        .number("offset", ms, "ms")
-        .number("half-of-95%-interval", 1e3 * found.half_95_s, "ms")
-        .number("correlation", found.correlation, "")
-        .number("turns", found.count as f64, "");
-    if let Some(rate) = found.rate {
-        finding = finding.number("rate", 1e6 * rate.share, "ppm").number(
-            "half-of-its-interval",
-            1e6 * rate.half_95,
-            "ppm",
-        );
-    }
-    match state {
-        State::Look | State::Wrong if beyond > LOOK_S => {
-            finding.mend(format!("`time-offset` {:.4} for {estimate}", found.offset_s))
-        }
-        State::Look | State::Wrong => {
-            finding.mend("no constant offset mends a rate: correct the stamps at their source")
-        }
-        _ => finding,
     }
 }

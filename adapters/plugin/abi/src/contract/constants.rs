@@ -68,6 +68,15 @@ pub const FLOOR_WORLD: i32 = 0;
 /// The floor is known in the body at the key frame.
 pub const FLOOR_BODY: i32 = 1;
 
+/// There was nothing to look at, or it does not suffice.
+pub const STATE_UNKNOWN: i32 = 0;
+/// Looked at, and as it should be.
+pub const STATE_OK: i32 = 1;
+/// A person should look.
+pub const STATE_LOOK: i32 = 2;
+/// Is wrong, or the data contradicts itself.
+pub const STATE_WRONG: i32 = 3;
+
 /// A line about something that failed.
 pub const LOG_ERROR: i32 = 1;
 /// A line about data that is used all the same.

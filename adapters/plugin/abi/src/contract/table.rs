@@ -3,7 +3,7 @@
 use std::ffi::c_void;
 
 use super::values::{
-    Camera, Cloud, DatasetInfo, DepthImage, Facts, Floor, Host, Image, ImageFile, ImuSamples, InertialState,
+    Camera, Cloud, DatasetInfo, DepthImage, Facts, Findings, Floor, Host, Image, ImageFile, ImuSamples, InertialState,
     Message, Motions, Poses, Probe, Rigid, Setting, SettingInfo, Stamps, Suspicions, Text,
 };
 
@@ -91,6 +91,8 @@ pub struct PluginTable {
     pub image_file: Option<FrameCall<ImageFile>>,
     /// What looks wrong.
     pub suspicions: Option<Call<Suspicions>>,
+    /// What the format's own checks find.
+    pub checks: Option<Call<Findings>>,
 }
 
 impl PluginTable {

@@ -406,3 +406,49 @@ pub struct Suspicions {
     /// To be released.
     pub owner: *mut c_void,
 }
+
+/// A number behind a finding.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct Number {
+    /// What it is.
+    pub name: Text,
+    /// The number, finite.
+    pub value: f64,
+    /// Its unit; empty for shares and counts.
+    pub unit: Text,
+}
+
+/// What a check of the format found.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct Finding {
+    /// Name of the check.
+    pub check: Text,
+    /// What was looked at; empty for the whole data set.
+    pub about: Text,
+    /// What was found.
+    pub says: Text,
+    /// What mends it, or empty.
+    pub mend: Text,
+    /// The numbers behind it.
+    pub numbers: *const Number,
+    /// How many.
+    pub number_count: usize,
+    /// `STATE_…`.
+    pub state: i32,
+    /// 0.
+    pub reserved: u32,
+}
+
+/// What the format's checks found.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct Findings {
+    /// In their order.
+    pub findings: *const Finding,
+    /// How many.
+    pub count: usize,
+    /// To be released.
+    pub owner: *mut c_void,
+}

@@ -122,6 +122,7 @@ fn plugin(factory: Box<dyn DatasetFactory>) -> Plugin {
         facts: Some(calls::scene::facts),
         image_file: Some(calls::cameras::image_file),
         suspicions: Some(calls::scene::suspicions),
+        checks: Some(calls::scene::checks),
     };
     // The strings and lists keep their place in memory when they are moved.
     Plugin { factory, table, _info: info, _offers: offers, _settings: settings }

@@ -5,6 +5,7 @@ use std::any::Any;
 use std::ffi::c_void;
 
 use vice_core::dataset::Fact;
+use vice_core::finding::{Finding, State};
 use vice_core::suspicion::Suspicion;
 
 use super::guard;
@@ -58,6 +59,50 @@ impl Facts {
         let facts =
             held.iter().map(|f| contract::Fact { section: text(&f.section), text: text(&f.text) }).collect();
         Box::new(Self { facts, _held: held })
+    }
+}
+
+/// Findings, and those of the contract that point at them.
+pub(super) struct Findings {
+    pub(super) findings: Vec<contract::Finding>,
+    _numbers: Vec<Vec<contract::Number>>,
+    _held: Vec<Finding>,
+}
+
+impl Findings {
+    pub(super) fn new(held: Vec<Finding>) -> Box<Self> {
+        let text = |s: &String| Text::from_bytes(s.as_bytes());
+        let numbers: Vec<Vec<contract::Number>> = held
+            .iter()
+            .map(|f| {
+                let of = |n: &vice_core::finding::Number| contract::Number {
+                    name: text(&n.name),
+                    value: n.value,
+                    unit: text(&n.unit),
+                };
+                f.numbers.iter().map(of).collect()
+            })
+            .collect();
+        let findings = held
+            .iter()
+            .zip(&numbers)
+            .map(|(f, numbers)| contract::Finding {
+                check: text(&f.check),
+                about: text(&f.about),
+                says: text(&f.says),
+                mend: text(&f.mend),
+                numbers: numbers.as_ptr(),
+                number_count: numbers.len(),
+                state: match f.state {
+                    State::Unknown => contract::STATE_UNKNOWN,
+                    State::Ok => contract::STATE_OK,
+                    State::Look => contract::STATE_LOOK,
+                    State::Wrong => contract::STATE_WRONG,
+                },
+                reserved: 0,
+            })
+            .collect();
+        Box::new(Self { findings, _numbers: numbers, _held: held })
     }
 }
 

@@ -1,4 +1,4 @@
-//! The scene, and what there is to say of the data set: scan, floor, facts, suspicions.
+//! The scene, and what there is to say of the data set: scan, floor, facts, suspicions, findings.
 #![allow(unsafe_code)]
 
 use std::ffi::c_void;
@@ -9,7 +9,7 @@ use vice_core::time::Stamp;
 
 use super::{Open, about};
 use crate::contract::{self, Message, Text};
-use crate::export::owned::{self, Facts, Suspicions, Texts};
+use crate::export::owned::{self, Facts, Findings, Suspicions, Texts};
 use crate::export::values;
 
 pub(in crate::export) unsafe extern "C" fn cloud(
@@ -73,6 +73,20 @@ pub(in crate::export) unsafe extern "C" fn facts(
         let held = Facts::new(open.dataset.facts());
         let (facts, count) = (held.facts.as_ptr(), held.facts.len());
         Ok(Some(contract::Facts { facts, count, owner: owned::give(held) }))
+    };
+    // SAFETY: the host's promise.
+    unsafe { about(dataset, out, message, call) }
+}
+
+pub(in crate::export) unsafe extern "C" fn checks(
+    dataset: *mut c_void,
+    out: *mut contract::Findings,
+    message: *mut Message,
+) -> i32 {
+    let call = |open: &Open| {
+        let held = Findings::new(open.dataset.checks());
+        let (findings, count) = (held.findings.as_ptr(), held.findings.len());
+        Ok(Some(contract::Findings { findings, count, owner: owned::give(held) }))
     };
     // SAFETY: the host's promise.
     unsafe { about(dataset, out, message, call) }
