@@ -241,6 +241,10 @@ fn automatic_labels_are_made_where_an_evaluation_asks_for_them() {
     let first = folder.path().join("first.json");
     let said = evaluate("evaluate", "auto:12", &[]);
     assert!(good(&said).contains("labels: automatic, 12 points"), "{}", said.stdout);
+    // What was followed is told with the numbers, in words and in the document.
+    for words in ["12 points, zcam", "points followed", "of the points move as one scene"] {
+        assert!(said.stdout.contains(words), "`{words}` is not in: {}", said.stdout);
+    }
     good(&evaluate("evaluate", "auto:12", &["--json", text(&first)]));
     let kept: Vec<_> = std::fs::read_dir(cache.join("labels")).unwrap().map(|f| f.unwrap().path()).collect();
     assert_eq!(kept.len(), 1, "{kept:?}");
@@ -249,6 +253,17 @@ fn automatic_labels_are_made_where_an_evaluation_asks_for_them() {
     good(&evaluate("evaluate", "auto:12", &["--json", text(&second)]));
     assert!(std::fs::read(&first).unwrap() == std::fs::read(&second).unwrap(), "not the same from the cache");
     assert_eq!(json(&first)["request"]["labels"]["file"], "auto:12");
+    let tracking = &json(&first)["used"]["tracking"];
+    let count = |name: &str| tracking[name].as_u64().unwrap_or_else(|| panic!("no {name}: {tracking}"));
+    assert_eq!((count("points"), count("frames_undecoded")), (12, 0));
+    assert!(count("followed") >= 60 && count("labels") <= count("labels_possible"), "{tracking}");
+    assert!(tracking["one_motion"]["median_percent"].as_f64().unwrap() > 75.0, "{tracking}");
+    let ended = tracking["ended"].as_object().unwrap();
+    let named: Vec<&str> = ended.keys().map(String::as_str).collect();
+    assert_eq!(named, ["doubtful", "left_image", "lost", "moved_apart", "no_way_back"]);
+    let by_hand = folder.path().join("by_hand.json");
+    good(&evaluate("evaluate", text(&flight.join("labels/scene.csv")), &["--json", text(&by_hand)]));
+    assert!(json(&by_hand)["used"]["tracking"].is_null(), "labels of a file were not tracked by VICE now");
     // What is broken is made anew, and the same.
     std::fs::write(&kept[0], b"{").unwrap();
     good(&evaluate("evaluate", "auto:12", &["--json", text(&second)]));

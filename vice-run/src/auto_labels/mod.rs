@@ -26,7 +26,7 @@ use crate::request::{
 };
 use crate::scene::Scene;
 
-pub(crate) use cache::labels_of;
+pub(crate) use cache::{Remembered, labels_of};
 
 use given::Givens;
 use ground::{Film, Grounds};
