@@ -3,11 +3,10 @@
 /** @import {App} from "./app.js" */
 /** @import {Direction, Edit, Pixel} from "./types.js" */
 
-import { getSuggestions, ServerError } from "./api.js";
+import { suggest } from "./suggesting.js";
 
 /** Moves by keys that follow each other faster are one step of undo. */
 const TOGETHER_MS = 300;
-const SUGGESTIONS = 4;
 
 /** @param {number} value pixels @returns {number} to 0.1, which is as fine as a hand is */
 const tenth = (value) => Math.round(value * 10) / 10;
@@ -22,6 +21,15 @@ export class Actions {
     this.tell = tell;
     /** @type {{name: string, frame: number, pixel: Pixel, timer: number} | null} a move by keys not yet sent */
     this.moving = null;
+    /** @type {Promise<unknown>} the last placing, with the tracking that it begins */
+    this.placing = Promise.resolve();
+  }
+
+  /** @returns {Promise<void>} when what was placed is on the disk and its tracking has begun */
+  async settled() {
+    this.settle();
+    await this.placing;
+    await this.app.session.written();
   }
 
   /** @returns {boolean} */
@@ -56,8 +64,21 @@ export class Actions {
    * @param {number} frame
    * @param {Pixel} pixel
    * @param {boolean} begins a segment
+   * @returns {Promise<void>}
    */
-  async #put(name, frame, pixel, begins) {
+  #put(name, frame, pixel, begins) {
+    const done = this.#putNow(name, frame, pixel, begins);
+    this.placing = done.catch(() => undefined);
+    return done;
+  }
+
+  /**
+   * @param {string} name
+   * @param {number} frame
+   * @param {Pixel} pixel
+   * @param {boolean} begins
+   */
+  async #putNow(name, frame, pixel, begins) {
     const { app } = this;
     app.labels.hope(name, frame, pixel);
     app.changed();
@@ -176,40 +197,12 @@ export class Actions {
   }
 
   suggest() {
-    return this.#suggest(null, null);
+    return suggest(this.app, this.tell, null);
   }
 
   /** @param {string} name suggests where this point may go on */
   suggestFor(name) {
-    return this.#suggest(name, this.app.labels.nextFixed(name, this.app.frame)?.frame ?? null);
-  }
-
-  /**
-   * @param {string | null} name null for new points
-   * @param {number | null} until
-   */
-  async #suggest(name, until) {
-    const { app } = this;
-    const { frame } = app;
-    try {
-      const { suggestions: list, lie } = await getSuggestions(frame, SUGGESTIONS, until);
-      app.suggested = { frame, list, name };
-      const caution = list.length === 0 ? "There is no good place to suggest in this frame." : this.#caution(lie);
-      if (caution) this.tell("warning", caution);
-    } catch (error) {
-      if (!(error instanceof ServerError)) throw error;
-      this.tell("error", `No suggestions: ${error.message}`);
-    }
-    app.changed();
-  }
-
-  /** @param {import("./types.js").Suggestions["lie"]} lie @returns {string} */
-  #caution(lie) {
-    const { state } = this.app.labels;
-    if (lie === "any" && state.depth_known) return "No depth is known in this frame: a key frame set here is not scored. Try another frame.";
-    if (lie === "below-horizon") return "No scan or depth camera tells the floor from walls here: take those that lie on the floor.";
-    if (lie === "depth" && state.floor_suggestions) return "No good corner was found on the floor of this frame: these lie elsewhere.";
-    return "";
+    return suggest(this.app, this.tell, name);
   }
 
   /** @param {number} index */

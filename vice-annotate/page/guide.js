@@ -36,9 +36,8 @@ export class Guide {
    */
   async go(step, what = "any") {
     const { app, actions } = this;
-    actions.settle();
     // What was just placed counts once it is on the disk, and then its tracking has begun.
-    await app.session.written();
+    await actions.settled();
     const task = app.tasks.next(app.target, app.selected, step, ({ kind }) => what === "any" || kind !== "doubtful");
     if (!task) return this.notices.tell("info", this.#nothing(what));
     this.player.pause();

@@ -48,16 +48,17 @@ impl Notes {
     /// [`DataError`] if the file cannot be read or is something else.
     pub fn open(labels: &Path) -> DataResult<Self> {
         let path = beside(labels, "notes");
-        let wrong = |e: DataError| {
-            e.at(&path).hint("move it away: all it says is where there was nothing to label")
-        };
+        let wrong =
+            |e: DataError| e.at(&path).hint("move it away: all it says is where there was nothing to label");
         let empty = match std::fs::metadata(&path) {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => BTreeMap::new(),
             Err(e) => return Err(wrong(DataError::new("cannot be read").because(e))),
-            Ok(meta) if meta.len() > MOST_BYTES => return Err(wrong(DataError::new("is too large for notes"))),
+            Ok(meta) if meta.len() > MOST_BYTES => {
+                return Err(wrong(DataError::new("is too large for notes")));
+            }
             Ok(_) => {
-                let bytes = std::fs::read(&path)
-                    .map_err(|e| wrong(DataError::new("cannot be read").because(e)))?;
+                let bytes =
+                    std::fs::read(&path).map_err(|e| wrong(DataError::new("cannot be read").because(e)))?;
                 let file: File = serde_json::from_slice(&bytes)
                     .map_err(|e| wrong(DataError::new(format!("is no {SCHEMA}: {e}"))))?;
                 if file.schema != SCHEMA {

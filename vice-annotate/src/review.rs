@@ -115,9 +115,8 @@ impl Review {
         let dataset = desk.dataset.name().to_string();
         let camera = desk.camera_name.clone();
         let said = read(&path, &dataset, &camera)?;
-        let document_has = |v: &Verdict| {
-            desk.store().document().get(&v.point, v.stamp).is_some_and(|o| o.px == v.stored_px)
-        };
+        let document_has =
+            |v: &Verdict| desk.store().document().get(&v.point, v.stamp).is_some_and(|o| o.px == v.stored_px);
         let (current, outdated): (Vec<_>, Vec<_>) = said.into_iter().partition(document_has);
         let verdicts = current.into_iter().map(|v| ((v.point.clone(), v.stamp), v)).collect();
         Ok(Self { path, dataset, camera, samples, verdicts, outdated: outdated.len() })
@@ -211,12 +210,15 @@ impl Summary {
 }
 
 fn read(path: &Path, dataset: &str, camera: &str) -> DataResult<Vec<Verdict>> {
-    let wrong =
-        |e: DataError| e.at(path).hint("move it away to begin a new review: it holds the distances of an earlier one");
+    let wrong = |e: DataError| {
+        e.at(path).hint("move it away to begin a new review: it holds the distances of an earlier one")
+    };
     match std::fs::metadata(path) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(vec![]),
         Err(e) => return Err(wrong(DataError::new("cannot be read").because(e))),
-        Ok(meta) if meta.len() > MOST_BYTES => return Err(wrong(DataError::new("is too large for a review"))),
+        Ok(meta) if meta.len() > MOST_BYTES => {
+            return Err(wrong(DataError::new("is too large for a review")));
+        }
         Ok(_) => {}
     }
     let bytes = std::fs::read(path).map_err(|e| wrong(DataError::new("cannot be read").because(e)))?;

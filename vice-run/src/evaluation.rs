@@ -7,7 +7,6 @@ use vice_core::suspicion::Suspicions;
 use vice_files::{address, labels};
 
 use crate::auto_labels::{Remembered, TrackingSpec, labels_of};
-use crate::tracking_summary::TrackingSummary;
 use crate::error::{Context, RunError, RunResult};
 use crate::label_noise::{put_into, read_floor};
 use crate::open::Opened;
@@ -17,6 +16,7 @@ use crate::request::{DepthName, DepthSpec, LabelsSpec, Request, points_asked};
 use crate::result::{OWN_ANCHOR, ResultDocument, Used};
 use crate::scene::Scene;
 use crate::streams::LoadedStreams;
+use crate::tracking_summary::TrackingSummary;
 
 /// Evaluates a request.
 ///

@@ -85,7 +85,10 @@ impl TrackingSummary {
                 self.pairs
             ),
             None => {
-                format!("no two frames have enough points to hold them against each other ({} pairs", self.pairs)
+                format!(
+                    "no two frames have enough points to hold them against each other ({} pairs",
+                    self.pairs
+                )
             }
         };
         text += &match self.pairs_unchecked {

@@ -52,7 +52,9 @@ fn tracking_backwards_from_a_respawn_makes_a_segment_of_its_own() {
 fn a_respawn_takes_over_nothing_of_what_follows() {
     let run = Run::new();
     let annotator = run.open();
-    good(annotator.edit(0, &[place("1", 0, 60.0, 40.0), place("1", 6, 51.0, 40.0), place("1", 7, 49.5, 40.0)]));
+    good(
+        annotator.edit(0, &[place("1", 0, 60.0, 40.0), place("1", 6, 51.0, 40.0), place("1", 7, 49.5, 40.0)]),
+    );
     let change = good(annotator.edit(1, &[spawn(3, 90.0, true)]));
     assert_eq!(change["label"], "begin 1 in frame 3");
     let lane = lane(&annotator.state(), "1");
@@ -120,7 +122,9 @@ fn a_review_is_blind_and_its_distances_are_kept() {
     assert_eq!(review.post("/api/edits", r#"{"revision": 1, "edits": []}"#).status, 404);
     // 0.5 px below where the wall went, in the first; in the second it cannot be told.
     let frame = samples[0]["frame"].as_f64().unwrap();
-    let say = |sample: usize, px: Value| review.post("/api/review", &json!({ "sample": sample, "px": px }).to_string());
+    let say = |sample: usize, px: Value| {
+        review.post("/api/review", &json!({ "sample": sample, "px": px }).to_string())
+    };
     let first = good(say(0, json!([90.0 - 1.5 * frame, 70.5])));
     let far = first["verdict"]["distance_px"].as_f64().unwrap();
     assert!((far - 0.5).abs() < 0.05, "{first}");
@@ -131,7 +135,8 @@ fn a_review_is_blind_and_its_distances_are_kept() {
     let second = good(say(1, Value::Null));
     assert_eq!((&second["summary"]["placed"], &second["summary"]["untold"]), (&json!(1), &json!(1)));
     review.interrupt();
-    let kept: Value = serde_json::from_slice(&std::fs::read(run.path("my.json.review.json")).unwrap()).unwrap();
+    let kept: Value =
+        serde_json::from_slice(&std::fs::read(run.path("my.json.review.json")).unwrap()).unwrap();
     assert_eq!(kept["schema"], "vice.review/1");
     assert_eq!(kept["reviews"].as_array().unwrap().len(), 2);
     assert_eq!(std::fs::read(run.path("my.json")).unwrap(), labels, "a review touches no label");
@@ -150,7 +155,11 @@ fn a_review_is_blind_and_its_distances_are_kept() {
     let now = changed.get("/api/review").json();
     assert_eq!((&now["outdated"], &now["summary"]["placed"]), (&json!(1), &json!(0)));
     drop(changed);
-    std::fs::write(run.path("my.json.review.json"), r#"{"schema": "vice.review/1", "dataset": "x", "camera": "cam0", "reviews": []}"#).unwrap();
+    std::fs::write(
+        run.path("my.json.review.json"),
+        r#"{"schema": "vice.review/1", "dataset": "x", "camera": "cam0", "reviews": []}"#,
+    )
+    .unwrap();
     let refused = vice(&run.args(&["--review"]));
     assert!(refused.code == 1 && refused.stderr.contains("is a review of cam0 of x"), "{}", refused.stderr);
 }

@@ -82,7 +82,9 @@ pub fn serve(desk: Desk, options: &ServerOptions, ready: impl FnOnce(&str)) -> D
     let review = options.review.map(|count| Review::open(&desk, count)).transpose()?;
     if let Some(review) = review.as_ref().filter(|r| r.outdated() > 0) {
         let (outdated, path) = (review.outdated(), review.path().display());
-        tracing::warn!("{path}: {outdated} of its verdicts are on labels that have changed since, and do not count");
+        tracing::warn!(
+            "{path}: {outdated} of its verdicts are on labels that have changed since, and do not count"
+        );
     }
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()

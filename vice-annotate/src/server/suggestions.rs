@@ -133,10 +133,8 @@ impl<'a> Ahead<'a> {
             .take_while(|f| seconds(desk, frame, *f) <= TRY.0)
             .take(TRY.1)
             .collect::<Vec<_>>();
-        let pictures: Vec<(usize, Arc<Pyramid>)> = tried
-            .into_par_iter()
-            .filter_map(|f| picture(desk, f).ok().map(|p| (f, Arc::new(p))))
-            .collect();
+        let pictures: Vec<(usize, Arc<Pyramid>)> =
+            tried.into_par_iter().filter_map(|f| picture(desk, f).ok().map(|p| (f, Arc::new(p)))).collect();
         Self { desk, frame, last, pictures }
     }
 
@@ -264,7 +262,12 @@ mod tests {
 
     #[test]
     fn what_stays_longer_comes_first_and_others_lie_apart_from_it() {
-        let all = vec![candidate(100.0, Some(0.3)), candidate(200.0, Some(4.0)), candidate(210.0, Some(3.9)), candidate(500.0, None)];
+        let all = vec![
+            candidate(100.0, Some(0.3)),
+            candidate(200.0, Some(4.0)),
+            candidate(210.0, Some(3.9)),
+            candidate(500.0, None),
+        ];
         let chosen = choose(all, 3, &[], 200.0, 4.0);
         let places: Vec<f64> = chosen.iter().map(|c| c.found.px.u).collect();
         assert_eq!(places, [200.0, 500.0, 210.0]);

@@ -149,7 +149,10 @@ impl Edit {
                 let placed = match suggested {
                     true => Observation {
                         source: ObservationSource::Auto,
-                        provenance: Provenance { tracker_version: tracker_version(), ..Provenance::default() },
+                        provenance: Provenance {
+                            tracker_version: tracker_version(),
+                            ..Provenance::default()
+                        },
                         ..placed
                     },
                     false => placed,

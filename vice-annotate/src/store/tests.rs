@@ -127,8 +127,7 @@ fn edits_are_checked_and_do_what_they_say() {
 fn a_suggestion_taken_as_one_of_many_is_the_trackers_until_it_is_touched() {
     let desk = Desk::new();
     let mut store = desk.open("a.json").unwrap();
-    let spawn =
-        |frame, suggested| Edit::Spawn { point: "1".into(), frame, u: 20.5, v: 30.25, suggested };
+    let spawn = |frame, suggested| Edit::Spawn { point: "1".into(), frame, u: 20.5, v: 30.25, suggested };
     assert_eq!(desk.edit(&mut store, spawn(4, true)).unwrap().label, "begin 1 in frame 4");
     let there = |store: &Store, frame: usize| *store.document().get("1", desk.frames[frame]).unwrap();
     let taken = there(&store, 4);
@@ -141,7 +140,8 @@ fn a_suggestion_taken_as_one_of_many_is_the_trackers_until_it_is_touched() {
     assert!(touched.source == ObservationSource::Manual && touched.keyframe);
     desk.edit(&mut store, spawn(9, false)).unwrap();
     assert!(there(&store, 9).source == ObservationSource::Manual && there(&store, 9).keyframe);
-    let refused = desk.edit(&mut store, Edit::Spawn { point: "a,b".into(), frame: 0, u: 1.0, v: 1.0, suggested: true });
+    let refused =
+        desk.edit(&mut store, Edit::Spawn { point: "a,b".into(), frame: 0, u: 1.0, v: 1.0, suggested: true });
     assert!(refused.unwrap_err().to_string().contains("name"));
     let reversed = desk.edit(&mut store, Edit::DeleteRange { point: "1".into(), frame: 9, to: 4 });
     assert!(reversed.unwrap_err().to_string().contains("after frame 4"));

@@ -260,7 +260,13 @@ impl Runner {
             }
             let confidence = step.confidence as f32;
             let (spread_px, refreshes) = (step.spread_px as f32, track.refreshes() as u16);
-            self.path.seen.push(Some(Seen { px: step.px, confidence, back_px: f32::NAN, spread_px, refreshes }));
+            self.path.seen.push(Some(Seen {
+                px: step.px,
+                confidence,
+                back_px: f32::NAN,
+                spread_px,
+                refreshes,
+            }));
         }
         self.return_to(entry, from, pictures);
     }
