@@ -63,7 +63,7 @@ test("four points on the floor, tracked, corrected and evaluated", { skip }, asy
   await window.press("n");
   await page.getByText(/^Lost, \d\.\d\d s after the frame before\. Click on its place to go on\.$/).waitFor();
   await window.screenshot("euroc-4-lost");
-  await window.goTo(3);
+  await window.goTo(2);
   await window.press("1", "ArrowRight");
   const corrected = await server.until("point 1 is corrected", (state) =>
     observation(state, "1", 2)?.source === "manual" && state.jobs.every((job) => job.state !== "running"));
@@ -116,7 +116,7 @@ test("targets are found from the panel, by keyboard alone, and taken back", { sk
   const found = await server.state();
   assert.ok(found.points.filter(({ name }) => name.startsWith("board.")).length === 42 && found.points.some(({ name }) => name.startsWith("tag")));
   assert.ok(found.points.every((point) => point.observations.every(({ source, confidence }) => source === "detected" && confidence !== null)));
-  await window.goTo(3);
+  await window.goTo(2);
   await window.screenshot("euroc-6-found");
   // Of many points the chosen one is in sight, in the list and on the timeline.
   const last = found.points[found.points.length - 1].name;

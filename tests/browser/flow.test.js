@@ -123,19 +123,19 @@ test("they are tracked forwards through all frames", async () => {
   assert.ok(from && to);
   const off = Math.hypot(later.u - start.u - (to.u - from.u), later.v - start.v - (to.v - from.v));
   assert.ok(off < 2, `point 2 is ${off} px from where it went`);
-  await first.goTo(CORRECTED + 1);
+  await first.goTo(CORRECTED);
   await first.screenshot("2-tracked");
 });
 
 test("a correction tracks again what follows, up to the next observation by hand", async () => {
   await first.press("2");
-  await first.goTo(BY_HAND + 1);
+  await first.goTo(BY_HAND);
   const tracked = await server.state();
   await first.press("Shift+ArrowDown");
   const held = await server.until("frame 20 is by hand, and followed", (state) =>
     observation(state, "2", BY_HAND)?.source === "manual" && state.jobs.every((job) => job.state !== "running") &&
     observation(state, "2", BY_HAND + 1)?.v !== observation(tracked, "2", BY_HAND + 1)?.v);
-  await first.goTo(CORRECTED + 1);
+  await first.goTo(CORRECTED);
   await first.press("Shift+ArrowRight", "Shift+ArrowRight", "ArrowRight");
   const corrected = await server.until("frame 10 is corrected and followed", (state) => {
     const here = observation(state, "2", CORRECTED);
@@ -156,13 +156,13 @@ test("a correction tracks again what follows, up to the next observation by hand
 test("marks, delete here and delete after, undo and redo", async () => {
   const { page } = first;
   await first.press("3");
-  await first.goTo(1);
+  await first.goTo(0);
   await first.press("o");
   await server.until("occluded", (state) => observation(state, "3", 0)?.occluded === true);
   await first.press("u");
   await server.until("uncertain", (state) => observation(state, "3", 0)?.uncertain === true);
   await first.press("1");
-  await first.goTo(6);
+  await first.goTo(5);
   const before = await server.state();
   await first.press("Shift+D");
   await server.until("the lane ends at frame 5", ({ points }) => points[0].observations.at(-1)?.frame === 5);
@@ -179,11 +179,11 @@ test("marks, delete here and delete after, undo and redo", async () => {
 });
 
 test("a doubtful frame is found", async () => {
-  await first.goTo(BY_HAND + 1);
+  await first.goTo(BY_HAND);
   await first.press("1");
   await first.press("u");
   await server.until("frame 20 is uncertain", (state) => observation(state, "1", BY_HAND)?.uncertain === true);
-  await first.goTo(BY_HAND - 1);
+  await first.goTo(BY_HAND - 2);
   await first.press("n");
   await first.shows(BY_HAND - 1 + 1);
   assert.match(await first.page.locator("#doubtful").innerText(), /\d+ doubtful/);
@@ -192,27 +192,33 @@ test("a doubtful frame is found", async () => {
 test("a point that left the image is offered a respawn, which begins a segment", async () => {
   const { page } = first;
   const state = await server.state();
-  await first.goTo(1);
+  await first.goTo(0);
   await first.press("a");
   const { x, y } = await first.place({ u: 3, v: 300 }, state);
   await page.mouse.click(x, y);
   await server.until("point 5 is there", (now) => observation(now, "5", 0) !== undefined);
-  await first.goTo(4);
-  await first.told("Point 5 left the image");
+  await first.goTo(3);
+  await first.told("Point 5 left the image after frame 0");
   await first.screenshot("3-respawn-offer");
   await page.getByRole("button", { name: "Respawn 5" }).click();
   await first.told("New place for point 5");
   await first.press("Enter");
   const respawned = await server.until("point 5 is back", (now) => observation(now, "5", 3) !== undefined);
   assert.equal(observation(respawned, "5", 3)?.keyframe, true);
+  await server.until("it is tracked on by itself", (now) => observation(now, "5", 4)?.source === "auto" && now.jobs.every((job) => job.state !== "running"));
+  // What was done is told in the frame numbers that the box shows.
+  assert.equal(await page.inputValue("#frame"), "3");
   await first.press("Control+z");
-  await server.until("a respawn is one step of undo", (now) => observation(now, "5", 3) === undefined);
+  await first.told("Undone: track 5 forwards from frame 3");
+  await first.press("Control+z");
+  await first.told("Undone: begin 5 in frame 3");
+  await server.until("a respawn is one step of undo, and its tracking another", (now) => observation(now, "5", 3) === undefined);
   await first.press("Control+y");
   await server.until("and of redo", (now) => observation(now, "5", 3)?.keyframe === true);
 });
 
 test("a frame that cannot be decoded is shown as such, the rest works", async () => {
-  await first.goTo(BROKEN + 1);
+  await first.goTo(BROKEN);
   await first.page.getByText("This frame cannot be shown.").waitFor();
   await first.screenshot("4-broken-frame");
   await first.press("e");
@@ -400,7 +406,7 @@ test("without the right token there is nothing", async () => {
 
 test("killed and started again it has every label, and says when it is gone", async () => {
   assert.deepEqual(first.complaints, []);
-  await first.goTo(3);
+  await first.goTo(2);
   await first.press("1", "ArrowLeft");
   const before = await server.until("frame 2 is by hand", (state) =>
     observation(state, "1", 2)?.source === "manual" && state.jobs.every((job) => job.state !== "running"));

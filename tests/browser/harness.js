@@ -84,11 +84,12 @@ export function scratch() {
  * A rendered flight with exact labels.
  * @param {number} seconds
  * @param {number} [rateHz]
+ * @param {number} [seed]
  * @returns {string} its folder
  */
-export function flight(seconds, rateHz = 10) {
+export function flight(seconds, rateHz = 10, seed = 1) {
   const folder = join(scratch(), "flight");
-  run(program(), ["synth", folder, "--duration", String(seconds), "--rate", String(rateHz)]);
+  run(program(), ["synth", folder, "--duration", String(seconds), "--rate", String(rateHz), "--seed", String(seed)]);
   return folder;
 }
 
@@ -282,11 +283,11 @@ export class Window {
     for (const key of keys) await this.page.keyboard.press(key);
   }
 
-  /** @param {number} place from 1 */
-  async goTo(place) {
-    await this.page.fill("#frame", String(place));
+  /** @param {number} frame of the data set */
+  async goTo(frame) {
+    await this.page.fill("#frame", String(frame));
     await this.page.keyboard.press("Enter");
-    await this.page.waitForFunction((wanted) => document.getElementById("timeline")?.getAttribute("aria-valuenow") === wanted, String(place));
+    await this.page.waitForFunction((wanted) => document.getElementById("timeline")?.getAttribute("aria-valuenow") === wanted, String(frame));
   }
 
   /**

@@ -7,7 +7,7 @@ import { browser, flight, ROOT, scratch, SCREENSHOTS, Server, Window } from "./h
 
 const SECONDS = 10;
 const RATE_HZ = 20;
-const SHOWN = 25;
+const SHOWN = 48;
 
 const dataset = flight(SECONDS, RATE_HZ);
 const estimates = ["drift", "clock-offset"].map((name) => join(dataset, "estimates", `${name}.txt`)).join(",");

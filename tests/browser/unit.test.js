@@ -8,6 +8,8 @@ import { afterEach, beforeEach, test } from "node:test";
 Object.assign(globalThis, { location: { search: "?token=secret" } });
 const { View } = await import("../../vice-annotate/page/view.js");
 const { Labels } = await import("../../vice-annotate/page/labels.js");
+const { coverage, coverageText } = await import("../../vice-annotate/page/coverage.js");
+const { Tasks } = await import("../../vice-annotate/page/tasks.js");
 const { outcome } = await import("../../vice-annotate/page/jobs.js");
 const { Keys, nameOf } = await import("../../vice-annotate/page/keys.js");
 const { Images } = await import("../../vice-annotate/page/images.js");
@@ -77,45 +79,93 @@ test("a point that is just being placed has its name, whatever happens to others
   assert.equal(labels.pixel("1", 0)?.u, 100);
 });
 
-test("doubtful frames are found in both directions, whichever lane they are in", () => {
-  const labels = new Labels(state([seen(2, { confidence: 0.3 }), seen(4), seen(18, { uncertain: true, confidence: null })]));
-  assert.deepEqual(labels.doubtfulFrom(1, 1, "1"), { place: 9, name: "1" });
-  assert.deepEqual(labels.doubtfulFrom(9, -1, "1"), { place: 1, name: "1" });
-  assert.equal(labels.doubtfulFrom(9, 1, "1"), null);
-  assert.equal(labels.doubtfulCount, 2);
+/**
+ * What is to be done, as place, lane and kind.
+ * @param {InstanceType<typeof Labels>} labels
+ */
+function tasks(labels) {
+  return new Tasks(labels).list.map(({ place, name, kind }) => `${place} ${name} ${kind}`);
+}
+
+/** A lane from one place to another, the first one a key frame. @param {number} from @param {number} to @param {Partial<Observation>} [last] */
+function lane(from, to, last = {}) {
+  return Array.from({ length: to - from + 1 }, (_, at) =>
+    seen(2 * (from + at), { ...(at === 0 ? { keyframe: true, source: "manual", confidence: null } : {}), ...(from + at === to ? last : {}) }));
+}
+
+test("a full lane needs nobody, whatever else there is is named by its kind", () => {
+  assert.deepEqual(tasks(new Labels(state(lane(0, 9)))), []);
+  assert.deepEqual(tasks(new Labels(state(lane(2, 9)))), ["0 1 start"]);
+  assert.deepEqual(tasks(new Labels(state(lane(0, 6)))), ["7 1 lost"]);
+  assert.deepEqual(tasks(new Labels(state(lane(0, 6, { u: 637 })))), ["7 1 left"]);
+  assert.deepEqual(tasks(new Labels(state([...lane(0, 4), ...lane(7, 9)]))), ["5 1 lost"], "a respawn later on fills no gap before it");
+  assert.deepEqual(tasks(new Labels(state(lane(0, 9).filter(({ frame }) => frame !== 8)))), ["4 1 gap"], "a frame was left out");
+  assert.deepEqual(tasks(new Labels(state(lane(0, 9, { uncertain: true })))), ["9 1 doubtful"]);
 });
 
-test("where tracking broke off inside the image is doubtful, a gap in a segment and the border are not", () => {
-  assert.deepEqual(new Labels(state([seen(2), seen(4)])).doubtfulFrom(0, 1, "1"), { place: 3, name: "1" });
-  assert.equal(new Labels(state([seen(2), seen(4)])).doubtfulCount, 1);
-  assert.equal(new Labels(state([seen(2), seen(8), seen(18)])).doubtfulFrom(0, 1, "1"), null);
-  assert.deepEqual(new Labels(state([seen(2), seen(8, { keyframe: true })])).doubtfulFrom(0, 1, "1")?.place, 2);
-  assert.equal(new Labels(state([seen(2), seen(4, { u: 637 })])).doubtfulCount, 0);
-  assert.equal(new Labels(state([seen(2, { source: "detected" }), seen(4, { source: "detected" })])).doubtfulCount, 0);
-  const placed = new Labels(state([seen(4, { source: "manual", confidence: null })]));
-  assert.equal(placed.doubtfulCount, 0, "it may not have been tracked yet");
-  placed.applyJob({ id: 1, kind: "track", points: ["1"], done: 1, total: 1, state: "done", ends: [{ point: "1", frame: 5, why: "lost", gap_s: 1 }] });
-  assert.equal(placed.doubtfulCount, 1, "now it has");
+test("doubtful frames in a row are one thing to look at, and are all counted", () => {
+  const observations = lane(0, 9).map((each, at) => ({ ...each, confidence: at >= 3 && at <= 5 ? 0.3 : each.confidence }));
+  const labels = new Labels(state(observations));
+  assert.deepEqual(tasks(labels), ["3 1 doubtful"]);
+  assert.deepEqual(new Tasks(labels).count, { doubtful: 3, gaps: 0 });
 });
 
-test("of several doubtful points in a frame one follows the other, then comes the next frame", () => {
+test("what was placed and not tracked yet is to be tracked; once it was and came to nothing, it is lost", () => {
+  const labels = new Labels(state(lane(4, 4)));
+  assert.deepEqual(tasks(labels), ["0 1 start", "4 1 untracked"]);
+  labels.trackedFrom("1", 8);
+  assert.deepEqual(tasks(labels), ["0 1 start", "5 1 lost"]);
+  const suggested = new Labels(state([seen(0, { keyframe: true, confidence: null })]));
+  assert.deepEqual(tasks(suggested), ["0 1 untracked"]);
+  suggested.applyJob({ id: 1, kind: "track", points: ["1"], done: 1, total: 1, state: "done", ends: [{ point: "1", frame: 1, why: "lost", gap_s: 1 }] });
+  assert.deepEqual(tasks(suggested), ["1 1 lost"]);
+});
+
+test("a lane that is being tracked, targets, and gaps that are said to be empty need nobody", () => {
+  const labels = new Labels(state(lane(0, 6)));
+  labels.applyJob({ id: 1, kind: "track", points: ["1"], done: 1, total: 9, state: "running" });
+  assert.deepEqual(tasks(labels), []);
+  assert.deepEqual(tasks(new Labels(state(lane(2, 6).map((each) => ({ ...each, source: "detected" }))))), []);
+  const said = new Labels({ ...state(lane(0, 6)), empty: [{ point: "1", from: 14, to: 18 }, { point: "2", from: 0, to: 4 }] });
+  assert.deepEqual(tasks(said), []);
+  said.setEmpty([{ point: "1", from: 16, to: 18 }]);
+  assert.deepEqual(tasks(said), ["7 1 lost"], "a part of it is still open");
+});
+
+test("from one thing to the next in time and then in lanes, and around the end", () => {
   const labels = new Labels(state([]));
-  labels.replace({ ...state([]), points: ["1", "2", "3"].map((name) => ({ name, observations: [seen(2), seen(4, { confidence: name === "2" ? 0.9 : 0.2 })] })) });
-  assert.deepEqual(labels.doubtfulFrom(0, 1, "3"), { place: 2, name: "1" });
-  assert.deepEqual(labels.doubtfulFrom(2, 1, "1"), { place: 2, name: "3" });
-  assert.deepEqual(labels.doubtfulFrom(2, 1, "3"), { place: 3, name: "1" }, "where all three are lost");
-  assert.deepEqual(labels.doubtfulFrom(2, -1, "3"), { place: 2, name: "1" });
-  assert.equal(labels.doubtfulFrom(2, -1, "1"), null);
+  labels.replace({ ...state([]), points: [{ name: "1", observations: lane(0, 4) }, { name: "2", observations: lane(0, 9) }, { name: "3", observations: lane(0, 4) }, { name: "4", observations: lane(3, 9) }] });
+  const all = new Tasks(labels);
+  const from = (/** @type {[number, string, 1 | -1]} */ ...at) => {
+    const task = all.next(...at);
+    return task && `${task.place} ${task.name}`;
+  };
+  assert.equal(from(0, "1", 1), "0 4");
+  assert.equal(from(0, "4", 1), "5 1");
+  assert.equal(from(5, "1", 1), "5 3");
+  assert.equal(from(5, "3", 1), "0 4", "around the end");
+  assert.equal(from(5, "1", -1), "0 4");
+  assert.equal(from(0, "4", -1), "5 3");
+  assert.equal(new Tasks(new Labels(state(lane(0, 9)))).next(3, "1", 1), null);
 });
 
-test("what ended a track is told in the numbers that the page shows", () => {
+test("coverage is the time that is labelled, of one point and of all", () => {
+  const labels = new Labels(state([]));
+  labels.replace({ ...state([]), points: [{ name: "1", observations: lane(0, 9) }, { name: "2", observations: lane(2, 4) }] });
+  assert.equal(coverageText(coverage(labels, "1")), "1 of 1 s, 100 %");
+  assert.equal(coverageText(coverage(labels, "2")), "0.3 of 1 s, 30 %");
+  assert.equal(coverageText(coverage(labels)), "1.3 of 2 s, 65 %");
+  assert.equal(coverageText({ labelled_s: 29.99, all_s: 30, share: 0.9997 }), "30 of 30 s, 99 %", "full is full");
+});
+
+test("what ended a track is told in the data set's own frame numbers", () => {
   const labels = new Labels(state([seen(0)]));
   /** @type {any} */
   const job = { id: 1, kind: "track", points: ["1", "2", "3"], done: 9, total: 9, state: "done", message: "", remarks: "1 frames could not be decoded",
     ends: [{ point: "1", frame: 8, why: "lost", gap_s: 0.95 }, { point: "3", frame: 8, why: "lost", gap_s: 0.95 }, { point: "2", frame: 6, why: "left-image", gap_s: 0.05 }] };
   const { kind, text } = outcome(job, labels, new Keys());
   assert.equal(kind, "info");
-  assert.equal(text, "Tracked 1, 2, 3. 1, 3 lost at frame 5, 0.95 s from the image before it. 2 left the image at frame 4. 1 frames could not be decoded. N goes to the next of these frames.");
+  assert.equal(text, "Tracked 1, 2, 3. 1, 3 lost at frame 8, 0.95 s from the image before it. 2 left the image at frame 6. 1 frames could not be decoded. N goes to the next of these frames.");
   assert.match(outcome({ ...job, state: "failed", message: "no disk" }, labels, new Keys()).text, /failed: no disk/);
   assert.equal(outcome({ ...job, state: "stopped" }, labels, new Keys()).text, "");
   assert.equal(outcome({ ...job, kind: "detect", message: "nothing" }, labels, new Keys()).text, "nothing");

@@ -3,11 +3,10 @@
 /** @import {App} from "./app.js" */
 /** @import {Direction, Edit, Pixel} from "./types.js" */
 
-import { getSuggestions, ServerError } from "./api.js";
+import { suggest } from "./suggesting.js";
 
 /** Moves by keys that follow each other faster are one step of undo. */
 const TOGETHER_MS = 300;
-const SUGGESTIONS = 4;
 
 /** @param {number} value pixels @returns {number} to 0.1, which is as fine as a hand is */
 const tenth = (value) => Math.round(value * 10) / 10;
@@ -22,6 +21,15 @@ export class Actions {
     this.tell = tell;
     /** @type {{name: string, frame: number, pixel: Pixel, timer: number} | null} a move by keys not yet sent */
     this.moving = null;
+    /** @type {Promise<unknown>} the last placing, with the tracking that it begins */
+    this.placing = Promise.resolve();
+  }
+
+  /** @returns {Promise<void>} when what was placed is on the disk and its tracking has begun */
+  async settled() {
+    this.settle();
+    await this.placing;
+    await this.app.session.written();
   }
 
   /** @returns {boolean} */
@@ -44,35 +52,45 @@ export class Actions {
   async place(at) {
     if (!this.#mayWrite()) return;
     const { app } = this;
-    const keyframe = app.respawning;
+    const begins = app.respawning;
     app.respawning = false;
     app.cursor = null;
-    app.suggested = keyframe ? null : app.suggested;
-    await this.#put(app.selected, app.frame, this.#tidy(at), keyframe);
+    if (begins || app.suggestedFor === app.selected) app.suggested = null;
+    await this.#put(app.selected, app.frame, this.#tidy(at), begins);
   }
 
   /**
    * @param {string} name
    * @param {number} frame
    * @param {Pixel} pixel
-   * @param {boolean} keyframe begins a segment
+   * @param {boolean} begins a segment
+   * @returns {Promise<void>}
    */
-  async #put(name, frame, pixel, keyframe) {
+  #put(name, frame, pixel, begins) {
+    const done = this.#putNow(name, frame, pixel, begins);
+    this.placing = done.catch(() => undefined);
+    return done;
+  }
+
+  /**
+   * @param {string} name
+   * @param {number} frame
+   * @param {Pixel} pixel
+   * @param {boolean} begins
+   */
+  async #putNow(name, frame, pixel, begins) {
     const { app } = this;
     app.labels.hope(name, frame, pixel);
     app.changed();
     // What runs on this point works from what has just been corrected.
     await app.session.stop([name]);
-    const goesOn = !app.observation && app.labels.lostAt(name, app.place);
-    /** @type {Edit[]} */
-    const edits = [{ op: "place", point: name, frame, ...pixel }];
-    if (keyframe) edits.push({ op: "mark", point: name, frame, keyframe: true });
-    const done = await app.session.edit(edits);
+    // What fills a gap of a lane goes on from here, whatever it was that ended the lane.
+    const fills = app.labels.lanes.has(name) && (begins || !app.labels.at(name, frame));
+    const done = await app.session.edit([{ op: begins ? "spawn" : "place", point: name, frame, ...pixel }]);
     app.labels.hope(name, frame, null);
     app.changed();
     if (!done) return;
-    // A point that was lost and is found again by hand goes on from here.
-    if (app.switches.retrack && (goesOn || app.labels.followedByAutomatic(name, frame))) {
+    if (app.switches.retrack && (fills || app.labels.followedByAutomatic(name, frame))) {
       await app.session.track([name], frame, "forward", app.labels.nextFixed(name, frame)?.frame ?? null);
     }
   }
@@ -171,35 +189,20 @@ export class Actions {
     const { app } = this;
     app.respawning = true;
     app.changed();
-    await this.suggest();
+    await this.suggestFor(app.selected);
     if (!app.respawning) return;
     app.cursor = this.#cursor();
-    this.tell("info", `New place for point ${app.selected}: click, take a suggestion, or move the cursor and press Enter.`);
+    this.tell("info", `New place for point ${app.selected}: click, take a suggestion (${app.keys.hint("use-suggestions")}), or move the cursor and press Enter.`);
     app.changed();
   }
 
-  async suggest() {
-    const { app } = this;
-    const { frame } = app;
-    try {
-      const { suggestions: list, lie } = await getSuggestions(frame, SUGGESTIONS);
-      app.suggested = { frame, list };
-      const caution = list.length === 0 ? "There is no good place to suggest in this frame." : this.#caution(lie);
-      if (caution) this.tell("warning", caution);
-    } catch (error) {
-      if (!(error instanceof ServerError)) throw error;
-      this.tell("error", `No suggestions: ${error.message}`);
-    }
-    app.changed();
+  suggest() {
+    return suggest(this.app, this.tell, null);
   }
 
-  /** @param {import("./types.js").Suggestions["lie"]} lie @returns {string} */
-  #caution(lie) {
-    const { state } = this.app.labels;
-    if (lie === "any" && state.depth_known) return "No depth is known in this frame: a key frame set here is not scored. Try another frame.";
-    if (lie === "below-horizon") return "No scan or depth camera tells the floor from walls here: take those that lie on the floor.";
-    if (lie === "depth" && state.floor_suggestions) return "No good corner was found on the floor of this frame: these lie elsewhere.";
-    return "";
+  /** @param {string} name suggests where this point may go on */
+  suggestFor(name) {
+    return suggest(this.app, this.tell, name);
   }
 
   /** @param {number} index */
@@ -207,31 +210,68 @@ export class Actions {
     const { app } = this;
     const taken = app.suggestions[index];
     if (!taken || !this.#mayWrite()) return;
-    if (app.respawning) return this.place(taken);
+    const place = { u: taken.u, v: taken.v };
+    if (app.respawning || app.suggestedFor === app.selected) {
+      app.suggested = null;
+      app.respawning = false;
+      app.cursor = null;
+      return this.#put(app.selected, app.frame, place, true);
+    }
     const rest = app.suggestions.filter((_, other) => other !== index);
-    app.suggested = rest.length > 0 ? { frame: app.frame, list: rest } : null;
+    app.suggested = rest.length > 0 ? { frame: app.frame, list: rest, name: null } : null;
     // A place of its own is a point of its own; only a respawn goes on with an old one.
     if (app.labels.lanes.has(app.selected)) app.selected = app.labels.freeName();
-    await this.#put(app.selected, app.frame, { u: taken.u, v: taken.v }, false);
+    await this.#put(app.selected, app.frame, place, false);
   }
 
-  /** All suggestions as new points, one step of undo. */
-  async takeAllSuggestions() {
+  /** The best suggestion for the point that they are for; without such a point all of them as new points, one step of undo. */
+  async useSuggestions() {
     const { app } = this;
     const { suggestions, frame } = app;
-    if (suggestions.length === 0 || !this.#mayWrite()) return;
+    if (suggestions.length === 0) return this.tell("info", `Nothing is suggested in this frame: ${app.keys.hint("suggest")} suggests.`);
+    if (app.respawning || app.suggestedFor === app.selected) return this.takeSuggestion(0);
+    if (!this.#mayWrite()) return;
     const taken = new Set(app.labels.names);
     /** @type {Edit[]} */
     const edits = suggestions.map(({ u, v }) => {
       let number = 1;
       while (taken.has(String(number))) number += 1;
       taken.add(String(number));
-      return { op: "place", point: String(number), frame, u, v };
+      // Nobody has looked at each by itself: it is the tracker's until it is touched.
+      return { op: "spawn", point: String(number), frame, u, v, suggested: true };
     });
     app.suggested = null;
-    app.respawning = false;
     app.cursor = null;
-    if (await app.session.edit(edits)) app.select(edits[0].op === "place" ? edits[0].point : app.selected);
+    if (await app.session.edit(edits)) app.select(edits[0].op === "spawn" ? edits[0].point : app.selected);
+  }
+
+  /** A person says that the observation here is right as it is. */
+  async accept() {
+    const { app } = this;
+    this.settle();
+    const { observation, selected: point, frame } = app;
+    if (!observation) return this.tell("info", `Point ${point} is not labelled in this frame.`);
+    if (!this.#mayWrite()) return;
+    const { u, v } = observation;
+    await app.session.edit([{ op: "place", point, frame, u, v }, { op: "mark", point, frame, uncertain: false }]);
+  }
+
+  /** There is nothing to label in this gap of the lane; where that was said before it is taken back. */
+  async nothingHere() {
+    const { app } = this;
+    const { labels, selected: point, place, frames } = app;
+    if (!labels.lanes.has(point) || app.observation) return this.tell("info", `Point ${point} has a label here: go to a gap of its lane.`);
+    if (!this.#mayWrite()) return;
+    const nothing = !labels.saidEmpty(point, app.frame);
+    let [first, last] = [place, place];
+    while (first > 0 && !labels.at(point, frames[first - 1].frame)) first -= 1;
+    while (last + 1 < frames.length && !labels.at(point, frames[last + 1].frame)) last += 1;
+    const [from, to] = [frames[first].frame, frames[last].frame];
+    app.suggested = null;
+    app.respawning = false;
+    if (!(await app.session.note({ point, from, to }, nothing))) return;
+    const again = app.keys.hint("nothing-here");
+    this.tell("info", nothing ? `Point ${point} has no place in frames ${from} to ${to}; ${again} takes that back.` : `Frames ${from} to ${to} of point ${point} are to be labelled again.`);
   }
 
   /** @param {"occluded" | "uncertain" | "keyframe"} mark */
@@ -255,6 +295,23 @@ export class Actions {
     await app.session.edit([{ op, point: app.selected, frame: app.frame }]);
   }
 
+  /** The first press marks one end of a range, the second one deletes from there to here. */
+  async deleteRange() {
+    const { app } = this;
+    this.settle();
+    const { selected: point, frame, range } = app;
+    if (!app.labels.lanes.has(point)) return this.tell("info", `Point ${point} has no labels.`);
+    if (!this.#mayWrite()) return;
+    if (range?.name !== point) {
+      app.range = { name: point, frame };
+      app.changed();
+      return this.tell("info", `One end of the range is frame ${frame}: go to the other and press ${app.keys.hint("delete-range")} again. Esc forgets it.`);
+    }
+    app.range = null;
+    await app.session.stop([point]);
+    await app.session.edit([{ op: "delete-range", point, frame: Math.min(frame, range.frame), to: Math.max(frame, range.frame) }]);
+  }
+
   /** @param {string} name */
   async removePoint(name) {
     if (!this.#mayWrite()) return;
@@ -274,6 +331,8 @@ export class Actions {
     if (to === name || to === "" || !this.#mayWrite()) return;
     const { app } = this;
     if (app.labels.lanes.has(to)) return this.tell("warning", `There is a point ${to} already.`);
+    // A point that is still to be placed has its name from then on.
+    if (!app.labels.lanes.has(name)) return app.select(to);
     if ((await app.session.edit([{ op: "rename", point: name, to }])) && app.selected === name) app.select(to);
   }
 
@@ -299,6 +358,7 @@ export class Actions {
     app.cursor = null;
     app.respawning = false;
     app.suggested = null;
+    app.range = null;
     app.changed();
     if ((await app.session.stop()) > 0) this.tell("info", "Stopped. What tracking found so far stays; a search for targets leaves nothing.");
   }

@@ -1,6 +1,6 @@
 // The server, as functions. Every request carries the token that stands in the page's address.
 
-/** @import {Change, Direction, Edit, Job, Projections, State, Suggestions, Targets} from "./types.js" */
+/** @import {Change, Direction, Edit, Empty, Job, Pixel, Projections, ReviewState, State, Suggestions, Summary, Targets, Verdict} from "./types.js" */
 
 const token = new URLSearchParams(location.search).get("token") ?? "";
 
@@ -80,10 +80,12 @@ export async function getProjections() {
 /**
  * @param {number} frame
  * @param {number} count
+ * @param {number | null} until the frame where the lane goes on: to stay in view for longer is worth nothing
  * @returns {Promise<Suggestions>}
  */
-export async function getSuggestions(frame, count) {
-  const response = await send(`/api/suggestions?frame=${frame}&count=${count}`, { cache: "no-store" });
+export async function getSuggestions(frame, count, until) {
+  const end = until === null ? "" : `&until=${until}`;
+  const response = await send(`/api/suggestions?frame=${frame}&count=${count}${end}`, { cache: "no-store" });
   return response.json();
 }
 
@@ -94,6 +96,15 @@ export async function getSuggestions(frame, count) {
  */
 export function postEdits(revision, edits) {
   return post("/api/edits", { revision, edits });
+}
+
+/**
+ * Says that there is nothing to label of a point from one frame to another, or takes it back.
+ * @param {Empty & {nothing: boolean}} note
+ * @returns {Promise<{empty: Empty[]}>}
+ */
+export function postNote(note) {
+  return post("/api/notes", note);
 }
 
 /**
@@ -145,9 +156,23 @@ export function postImport(format, body) {
   return post(`/api/import?format=${format}`, body);
 }
 
+/** @returns {Promise<ReviewState>} */
+export async function getReview() {
+  return (await send("/api/review", { cache: "no-store" })).json();
+}
+
+/**
+ * @param {number} sample its place in the list
+ * @param {Pixel | null} pixel where the point is; null: it cannot be told
+ * @returns {Promise<{verdict: Verdict, summary: Summary}>}
+ */
+export function postVerdict(sample, pixel) {
+  return post("/api/review", { sample, px: pixel && [pixel.u, pixel.v] });
+}
+
 /**
  * Follows what other windows and running jobs do.
- * @param {{change: (change: Change) => void, job: (job: Job) => void, save: (problem: string | null) => void,
+ * @param {{change: (change: Change) => void, job: (job: Job) => void, notes: (empty: Empty[]) => void, save: (problem: string | null) => void,
  *   closed: () => void, lost: () => void, open: () => void}} on
  */
 export function follow(on) {
@@ -155,6 +180,7 @@ export function follow(on) {
   events.addEventListener("open", () => on.open());
   events.addEventListener("change", (event) => on.change(JSON.parse(event.data)));
   events.addEventListener("job", (event) => on.job(JSON.parse(event.data)));
+  events.addEventListener("notes", (event) => on.notes(JSON.parse(event.data).empty));
   events.addEventListener("save", (event) => on.save(JSON.parse(event.data).save_problem));
   events.addEventListener("closed", () => {
     events.close();

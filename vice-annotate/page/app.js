@@ -8,6 +8,8 @@
 /** @import {Session} from "./session.js" */
 /** @import {Viewer} from "./viewer.js" */
 
+import { Tasks } from "./tasks.js";
+
 /**
  * @typedef {object} Switches
  * @property {boolean} retrack a correction tracks again what follows
@@ -44,6 +46,7 @@ export class App {
    */
   constructor(labels, images, keys) {
     this.labels = labels;
+    this.tasks = new Tasks(labels);
     this.images = images;
     this.keys = keys;
     /** @type {Session} */
@@ -61,8 +64,10 @@ export class App {
     this.cursor = null;
     /** The next placing begins a segment. */
     this.respawning = false;
-    /** @type {{frame: number, list: Suggestion[]} | null} */
+    /** @type {{frame: number, list: Suggestion[], name: string | null} | null} with the point that is to go on there; null: new ones */
     this.suggested = null;
+    /** @type {{name: string, frame: number} | null} one end of a range that is to be deleted */
+    this.range = null;
     /** @type {Set<string>} points whose offer of a respawn was declined, with the frame their lane ended at */
     this.declined = new Set();
     this.switches = storedSwitches();
@@ -117,6 +122,11 @@ export class App {
     return this.suggested?.frame === this.frame ? this.suggested.list : [];
   }
 
+  /** @returns {string | null} the point that the suggestions in the shown frame are for */
+  get suggestedFor() {
+    return this.suggested?.frame === this.frame ? this.suggested.name : null;
+  }
+
   /** @returns {Pixel | null} what the loupe looks at */
   get attention() {
     return this.hover ?? this.cursor ?? this.pixel;
@@ -124,7 +134,11 @@ export class App {
 
   /** @param {string} name */
   select(name) {
-    if (name !== this.selected) this.respawning = false;
+    if (name !== this.selected) {
+      this.respawning = false;
+      this.range = null;
+      if (this.suggested?.name) this.suggested = null;
+    }
     this.selected = name;
     this.changed();
   }

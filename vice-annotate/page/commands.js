@@ -2,16 +2,19 @@
 
 /** @import {Actions} from "./actions.js" */
 /** @import {App} from "./app.js" */
+/** @import {Guide} from "./guide.js" */
 /** @import {Help} from "./help.js" */
 /** @import {Player} from "./player.js" */
 /** @import {Targets} from "./targets.js" */
 
+import { byId } from "./dom.js";
 import { nameOf } from "./keys.js";
 
 const ZOOM_STEP = 1.4;
 const FAR = 10;
 const WRITES = new Set([
   "new-point", "suggest", "targets", "respawn", "track-forward", "track-backward", "track-both", "track-all", "delete", "delete-after",
+  "use-suggestions", "accept", "delete-range", "nothing-here",
 ]);
 
 /**
@@ -20,10 +23,10 @@ const WRITES = new Set([
  * @param {Player} player
  * @param {Help} help
  * @param {Targets} targets
- * @param {(kind: "info", text: string) => void} tell
+ * @param {Guide} guide
  * @returns {Record<string, () => unknown>}
  */
-export function commands(app, actions, player, help, targets, tell) {
+export function commands(app, actions, player, help, targets, guide) {
   const { view } = app.viewer;
   /** @param {"dots" | "loupe" | "follow" | "invert"} name */
   const toggle = (name) => () => {
@@ -45,14 +48,22 @@ export function commands(app, actions, player, help, targets, tell) {
     "first-frame": () => player.step(-Infinity),
     "last-frame": () => player.step(Infinity),
     play: () => player.toggle(),
-    "next-doubtful": () => player.doubtful(1) || tell("info", "No doubtful frame after this one."),
-    "previous-doubtful": () => player.doubtful(-1) || tell("info", "No doubtful frame before this one."),
+    "next-task": () => guide.go(1),
+    "previous-task": () => guide.go(-1),
+    "next-gap": () => guide.go(1, "gap"),
+    "previous-gap": () => guide.go(-1, "gap"),
     place: () => actions.placeByKey(),
     cursor: () => actions.toggleCursor(),
     "new-point": () => actions.newPoint(),
     "next-point": () => actions.otherPoint(1),
     "previous-point": () => actions.otherPoint(-1),
     suggest: () => actions.suggest(),
+    "use-suggestions": () => actions.useSuggestions(),
+    name: () => {
+      const name = byId("name", HTMLInputElement);
+      name.focus();
+      name.select();
+    },
     targets: () => app.writable && targets.show(),
     respawn: () => actions.respawn(),
     "track-forward": () => actions.track([app.selected], "forward"),
@@ -63,6 +74,9 @@ export function commands(app, actions, player, help, targets, tell) {
     occluded: () => actions.toggleMark("occluded"),
     uncertain: () => actions.toggleMark("uncertain"),
     "key-frame": () => actions.toggleMark("keyframe"),
+    accept: () => actions.accept(),
+    "delete-range": () => actions.deleteRange(),
+    "nothing-here": () => actions.nothingHere(),
     delete: () => actions.remove("delete"),
     "delete-after": () => actions.remove("delete-after"),
     undo: () => actions.history("undo"),

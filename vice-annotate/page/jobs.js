@@ -1,4 +1,4 @@
-// What the page says of work in the background, in its own numbers: frames are counted from 1 among those that are labelled.
+// What the page says of work in the background. Frames are counted as everywhere: by their index in the data set.
 
 /** @import {Job, LaneEnd} from "./types.js" */
 /** @import {Keys} from "./keys.js" */
@@ -25,8 +25,8 @@ export function outcome(job, labels, keys) {
   if (detect) return { kind: "info", text: job.message ?? "" };
   const parts = [`Tracked ${job.points.join(", ")}`, ...endings(job.ends ?? [], labels)];
   if (job.remarks) parts.push(job.remarks);
-  const lost = job.ends?.some(({ why }) => why === "lost");
-  if (lost) parts.push(`${keys.hint("next-doubtful")} goes to the next of these frames`);
+  const open = job.ends?.some(({ why }) => why !== "changed");
+  if (open) parts.push(`${keys.hint("next-task")} goes to the next of these frames`);
   return { kind: "info", text: `${parts.join(". ")}.` };
 }
 
@@ -45,7 +45,7 @@ function endings(ends, labels) {
   return [...alike.values()].map((group) => {
     const { why, frame, gap_s } = group[0];
     const names = group.map(({ point }) => point).join(", ");
-    const at = labels.placeNear(frame) + 1;
+    const at = labels.state.frames[labels.placeNear(frame)].frame;
     if (why === "left-image") return `${names} left the image at frame ${at}`;
     if (why === "changed") return `${names} was changed where tracking started`;
     const far = gap_s > LONG_GAP_S ? `, ${gap_s.toFixed(2)} s from the image before it` : "";

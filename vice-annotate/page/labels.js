@@ -1,6 +1,6 @@
 // The labels as the server last said, and questions about them. Everything that changes them comes through here.
 
-/** @import {Change, Dot, Edit, Job, Observation, Pixel, Point, Projections, State} from "./types.js" */
+/** @import {Change, Dot, Edit, Empty, Job, Observation, Pixel, Point, Projections, State} from "./types.js" */
 
 const DOUBT_BELOW = 0.5;
 /** How near the border, as a part of the image's width, a point is taken to have left the image. */
@@ -22,11 +22,14 @@ export class Labels {
     this.projections = null;
     /** @type {Map<number, Dot[]>} by frame */
     this.dots = new Map();
-    /** The number of doubtful frames, and the revision it was counted at. */
-    this.counted = 0;
-    this.countedAt = -1;
+    /** Grows with all that is heard beside changes of the labels. */
+    this.heard = 0;
     /** @type {Map<string, Set<number>>} the frames in which tracking lost a point, as far as this page heard of it */
     this.lost = new Map();
+    /** @type {Map<string, Set<number>>} the frames that a point was tracked from, as far as this page heard of it */
+    this.starts = new Map();
+    /** @type {Map<string, [number, number][]>} the frames in which a person says there is nothing to label, by point */
+    this.empty = new Map();
     /** @type {Map<string, Pixel>} shown before the server has said yes; by point and frame */
     this.hopes = new Map();
     this.replace(state);
@@ -39,8 +42,9 @@ export class Labels {
     this.lanes = new Map();
     for (const point of state.points) this.#index(point);
     for (const job of state.jobs) this.#heardOf(job);
+    this.setEmpty(state.empty ?? []);
     this.hopes.clear();
-    this.countedAt = -1;
+    this.heard += 1;
   }
 
   /** @param {Point} point */
@@ -120,7 +124,43 @@ export class Labels {
       if (there) there.add(frame);
       else this.lost.set(point, new Set([frame]));
     }
-    this.countedAt = -1;
+    this.heard += 1;
+  }
+
+  /** @param {Empty[]} list */
+  setEmpty(list) {
+    this.empty = new Map();
+    for (const { point, from, to } of list) this.empty.set(point, [...(this.empty.get(point) ?? []), [from, to]]);
+    this.heard += 1;
+  }
+
+  /**
+   * @param {string} name
+   * @param {number} frame
+   * @returns {boolean} whether a person says that there is nothing to label
+   */
+  saidEmpty(name, frame) {
+    return (this.empty.get(name) ?? []).some(([from, to]) => from <= frame && frame <= to);
+  }
+
+  /**
+   * @param {string} name
+   * @param {number} frame
+   */
+  trackedFrom(name, frame) {
+    this.starts.set(name, (this.starts.get(name) ?? new Set()).add(frame));
+    this.heard += 1;
+  }
+
+  /**
+   * @param {string} name
+   * @param {number} frame
+   * @returns {boolean} whether a point was tracked from here, or lost right after it
+   */
+  tried(name, frame) {
+    const next = this.state.frames[(this.places.get(frame) ?? 0) + 1]?.frame ?? Infinity;
+    const lost = [...(this.lost.get(name) ?? [])].some((each) => each > frame && each <= next);
+    return lost || (this.starts.get(name)?.has(frame) ?? false);
   }
 
   /** @returns {Job[]} */
@@ -231,12 +271,12 @@ export class Labels {
       const last = this.lastUpTo(name, frame);
       // A target's corners are found again where they are in sight: nobody need place them.
       if (!last || last.source === "detected" || last.frame === frame || last !== this.#observations(name).at(-1)) return false;
-      return this.#atBorder(last);
+      return this.atBorder(last);
     });
   }
 
-  /** @param {Pixel} pixel */
-  #atBorder({ u, v }) {
+  /** @param {Pixel} pixel @returns {boolean} whether a point there is as good as gone from the image */
+  atBorder({ u, v }) {
     const { width, height } = this.state;
     const margin = Math.max(8, width * BORDER);
     return u < margin || v < margin || u > width - 1 - margin || v > height - 1 - margin;
@@ -250,53 +290,14 @@ export class Labels {
   lostAt(name, place) {
     const { frames } = this.state;
     const before = place > 0 ? this.at(name, frames[place - 1].frame) : null;
-    if (!before || this.at(name, frames[place].frame) || this.#atBorder(before)) return false;
+    if (!before || this.at(name, frames[place].frame) || this.atBorder(before)) return false;
     // Where a person has placed a point it may not have been tracked from yet; a detector follows nothing.
     const { frame } = frames[place];
     const heard = [...(this.lost.get(name) ?? [])].some((each) => each > before.frame && each <= frame);
-    if (before.source !== "auto" && !heard) return false;
+    if ((before.source !== "auto" || before.confidence === null) && !heard) return false;
     // A gap in a segment is a frame that could not be decoded, or was deleted.
     const next = this.#observations(name).find((each) => each.frame > frames[place].frame);
     return next === undefined || next.keyframe;
-  }
-
-  /**
-   * The next doubtful observation, or place where tracking broke off: of the points after (before) this one in this frame,
-   * then in the frames after (before).
-   * @param {number} place among the frames
-   * @param {1 | -1} step
-   * @param {string} name
-   * @returns {{place: number, name: string} | null}
-   */
-  doubtfulFrom(place, step, name) {
-    const names = step > 0 ? this.names : this.names.reverse();
-    const wanted = (/** @type {number} */ at) => (/** @type {string} */ each) => {
-      const observation = this.at(each, this.state.frames[at].frame);
-      return observation ? this.doubtful(observation) : this.lostAt(each, at);
-    };
-    const here = names.slice(names.indexOf(name) + 1).find(wanted(place));
-    if (names.includes(name) && here !== undefined) return { place, name: here };
-    for (let at = place + step; at >= 0 && at < this.state.frames.length; at += step) {
-      const there = names.find(wanted(at));
-      if (there !== undefined) return { place: at, name: there };
-    }
-    return null;
-  }
-
-  /** @returns {number} frames with a doubtful observation, or where tracking broke off */
-  get doubtfulCount() {
-    if (this.countedAt === this.state.revision) return this.counted;
-    const frames = new Set();
-    for (const { name, observations } of this.state.points) {
-      for (const each of observations) {
-        if (this.doubtful(each)) frames.add(each.frame);
-        const after = (this.places.get(each.frame) ?? Infinity) + 1;
-        if (after < this.state.frames.length && this.lostAt(name, after)) frames.add(this.state.frames[after].frame);
-      }
-    }
-    this.countedAt = this.state.revision;
-    this.counted = frames.size;
-    return this.counted;
   }
 
   /**
@@ -307,7 +308,7 @@ export class Labels {
   touchedBy(edits) {
     return JSON.stringify(
       edits.map((edit) => {
-        if (edit.op === "place" || edit.op === "mark" || edit.op === "delete") return this.at(edit.point, edit.frame);
+        if (edit.op === "place" || edit.op === "mark") return this.at(edit.point, edit.frame);
         return this.#observations(edit.point);
       }),
     );

@@ -8,6 +8,7 @@ import { App } from "./app.js";
 import { commands, disableWrites, listenToButtons, listenToKeys, showKeyHints } from "./commands.js";
 import { byId, setText } from "./dom.js";
 import { bringIn } from "./exchange.js";
+import { Guide } from "./guide.js";
 import { Help } from "./help.js";
 import { Images } from "./images.js";
 import { Keys } from "./keys.js";
@@ -87,10 +88,11 @@ async function open() {
   });
   const loupe = new Loupe(byId("loupe", HTMLElement), byId("loupe-image", HTMLCanvasElement), byId("loupe-marks", HTMLCanvasElement), byId("loupe-readout", HTMLElement));
   const panels = new Panels(app, actions);
+  const guide = new Guide(app, player, actions, notices);
   const status = new Status(app, player, actions, notices);
   const help = new Help(app.keys, () => showKeyHints(app));
   app.session = new Session(labels, listener(app, status));
-  const table = commands(app, actions, player, help, new Targets(app), tell);
+  const table = commands(app, actions, player, help, new Targets(app), guide);
   listenToKeys(app, table);
   listenToButtons(app, table);
   showKeyHints(app);
@@ -104,8 +106,8 @@ async function open() {
     viewer.marks.focus();
   });
   byId("frame", HTMLInputElement).addEventListener("change", (event) => {
-    const place = /** @type {HTMLInputElement} */ (event.target).valueAsNumber;
-    if (Number.isInteger(place)) player.step(place - 1 - app.target);
+    const frame = /** @type {HTMLInputElement} */ (event.target).valueAsNumber;
+    if (Number.isInteger(frame)) player.step(app.labels.placeNear(frame) - app.target);
     viewer.marks.focus();
   });
   const menu = byId("file-menu", HTMLDetailsElement);
@@ -116,7 +118,7 @@ async function open() {
     if (event.key === "Escape") menu.open = false;
   });
   for (const format of /** @type {const} */ (["json", "csv", "cvat"])) byId(`export-${format}`, HTMLAnchorElement).href = exportAddress(format);
-  app.listeners.push(() => viewer.draw(), () => loupe.draw(app), () => timeline.draw(), () => panels.draw(), () => status.draw());
+  app.listeners.push(() => viewer.draw(), () => loupe.draw(app), () => timeline.draw(), () => panels.draw(), () => status.draw(), () => guide.draw());
   window.addEventListener("beforeunload", (event) => {
     if (actions.moving === null && app.session.pending === 0) return;
     actions.settle();

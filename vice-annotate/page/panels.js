@@ -4,6 +4,7 @@
 /** @import {Actions} from "./actions.js" */
 /** @import {Observation, Projections, Stream} from "./types.js" */
 
+import { coverage, coverageText } from "./coverage.js";
 import { button, byId, make, setText } from "./dom.js";
 import { pointColour, streamColour } from "./palette.js";
 
@@ -36,9 +37,8 @@ export class Panels {
     /** @type {Projections | null} what the table shows, and for which frame and point */
     this.tabled = null;
     this.tabledFor = "";
-    /** @type {Map<string, {choose: HTMLButtonElement, here: HTMLElement}>} */
+    /** @type {Map<string, {choose: HTMLButtonElement, here: HTMLElement, cover: HTMLElement}>} */
     this.rows = new Map();
-    this.takeAll.addEventListener("click", () => actions.takeAllSuggestions());
     this.name.addEventListener("change", () => actions.rename(app.selected, this.name.value.trim()));
     this.name.addEventListener("keydown", (event) => {
       if (event.key === "Escape") this.name.value = app.selected;
@@ -50,8 +50,9 @@ export class Panels {
     this.#drawPoints();
     this.#drawChosen();
     this.#drawDots();
-    this.takeAll.hidden = this.app.suggestions.length === 0 || this.app.respawning;
-    setText(this.takeAll, `Use all ${this.app.suggestions.length}`);
+    const { suggestions, respawning, suggestedFor, selected } = this.app;
+    this.takeAll.hidden = suggestions.length === 0;
+    setText(this.takeAll, respawning || suggestedFor === selected ? `Use S1 for ${selected}` : `Use all ${suggestions.length}`);
   }
 
   #drawPoints() {
@@ -64,12 +65,13 @@ export class Panels {
       this.rows.clear();
       this.points.replaceChildren(...shown.map((name) => this.#row(name)));
     }
-    for (const [name, { choose, here }] of this.rows) {
+    for (const [name, { choose, here, cover }] of this.rows) {
       const observation = app.labels.at(name, app.frame);
       const doubtful = observation !== null && app.labels.doubtful(observation);
       choose.setAttribute("aria-current", String(name === app.selected));
       here.classList.toggle("doubt", doubtful || app.labels.lostAt(name, app.place));
       setText(here, this.#hereText(name, observation, doubtful));
+      setText(cover, app.labels.lanes.has(name) ? coverageText(coverage(app.labels, name)) : "");
     }
     if (this.inSight === app.selected) return;
     this.inSight = app.selected;
@@ -83,7 +85,10 @@ export class Panels {
    */
   #hereText(name, observation, doubtful) {
     if (!this.app.labels.lanes.has(name)) return "to be placed";
-    if (!observation) return this.app.labels.lostAt(name, this.app.place) ? "lost" : "not here";
+    if (!observation) {
+      if (this.app.labels.saidEmpty(name, this.app.frame)) return "nothing here";
+      return this.app.labels.lostAt(name, this.app.place) ? "lost" : "not here";
+    }
     if (doubtful) return "doubtful";
     return observation.occluded ? "occluded" : SOURCES[observation.source];
   }
@@ -95,14 +100,15 @@ export class Panels {
     const index = app.labels.indexOf(name);
     dot.style.background = pointColour(index < 0 ? app.labels.names.length : index);
     const here = make("span", { class: "here" });
-    const choose = make("button", { class: "choose" }, [dot, make("b", { text: name }), here]);
+    const cover = make("span", { class: "cover", title: "how much of the time is labelled" });
+    const choose = make("button", { class: "choose" }, [dot, make("b", { text: name }), here, cover]);
     choose.type = "button";
     choose.addEventListener("click", () => app.select(name));
     const row = make("li", {}, [choose]);
     if (index >= 0 && app.writable) {
       row.append(button("×", () => this.actions.removePoint(name), { class: "plain", label: `Remove point ${name}`, title: `Remove point ${name}` }));
     }
-    this.rows.set(name, { choose, here });
+    this.rows.set(name, { choose, here, cover });
     return row;
   }
 
@@ -110,7 +116,7 @@ export class Panels {
     const { app } = this;
     const { observation } = app;
     if (document.activeElement !== this.name) this.name.value = app.selected;
-    this.name.disabled = !app.writable || !app.labels.lanes.has(app.selected);
+    this.name.disabled = !app.writable;
     const pixel = app.pixel;
     const where = pixel ? `${pixel.u.toFixed(1)}, ${pixel.v.toFixed(1)} px` : "";
     setText(this.chosen, observation ? `${where} · ${sourceText(observation)}` : where || this.#absentText());

@@ -94,15 +94,4 @@ export class Player {
     }
     this.pause();
   }
-
-  /** @param {1 | -1} step @returns {boolean} whether there is one */
-  doubtful(step) {
-    const { app } = this;
-    const found = app.labels.doubtfulFrom(app.target, step, app.selected);
-    if (!found) return false;
-    this.pause();
-    app.select(found.name);
-    this.go(found.place).then(() => app.pixel && app.viewer.view.reveal(app.pixel));
-    return true;
-  }
 }

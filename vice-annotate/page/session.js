@@ -1,10 +1,10 @@
 // Writes to the server: one after the other, each on the revision that the user saw. A write that came too late is
 // refused by the server; then the state is read again and the user is told.
 
-/** @import {Change, Direction, Edit, Job, Targets} from "./types.js" */
+/** @import {Change, Direction, Edit, Empty, Job, Targets} from "./types.js" */
 /** @import {Labels} from "./labels.js" */
 
-import { follow, getProjections, getState, postDetect, postEdits, postHistory, postImport, postTrack, ServerError, stopJob } from "./api.js";
+import { follow, getProjections, getState, postDetect, postEdits, postHistory, postImport, postNote, postTrack, ServerError, stopJob } from "./api.js";
 
 const PROJECTIONS_AFTER_MS = 250;
 
@@ -40,6 +40,10 @@ export class Session {
         this.labels.applyJob(job);
         this.listener.changed();
         if (job.state !== "running") this.listener.finished(job);
+      },
+      notes: (empty) => {
+        this.labels.setEmpty(empty);
+        this.listener.changed();
       },
       save: (problem) => {
         this.labels.state.save_problem = problem;
@@ -171,6 +175,23 @@ export class Session {
   }
 
   /**
+   * @param {Empty} stretch
+   * @param {boolean} nothing whether there is nothing to label
+   * @returns {Promise<boolean>}
+   */
+  note(stretch, nothing) {
+    return this.#write(async () => {
+      try {
+        const { empty } = await postNote({ ...stretch, nothing });
+        this.labels.setEmpty(empty);
+        return true;
+      } catch (error) {
+        return this.#refused(error);
+      }
+    });
+  }
+
+  /**
    * @param {"undo" | "redo"} which
    * @returns {Promise<Change | null>}
    */
@@ -195,6 +216,7 @@ export class Session {
    * @returns {Promise<boolean>} whether it has begun
    */
   track(points, frame, direction, until) {
+    for (const name of points) this.labels.trackedFrom(name, frame);
     return this.#begin(() => postTrack(this.labels.state.revision, { points, frame, direction, until }));
   }
 

@@ -5,6 +5,7 @@
 /** @import {Notices} from "./notices.js" */
 /** @import {Player} from "./player.js" */
 
+import { coverage, coverageText } from "./coverage.js";
 import { byId, setText } from "./dom.js";
 import { underway } from "./jobs.js";
 
@@ -70,19 +71,17 @@ export class Status {
   #drawFrame() {
     const { app } = this;
     const { frames, place } = app;
-    if (document.activeElement !== this.frameInput) this.frameInput.value = String(place + 1);
-    this.frameInput.max = String(frames.length);
-    setText(byId("frames", HTMLElement), `of ${frames.length}`);
     const { time_s, stamp_ns, frame } = frames[place];
+    if (document.activeElement !== this.frameInput) this.frameInput.value = String(frame);
+    this.frameInput.min = String(frames[0].frame);
+    this.frameInput.max = String(frames[frames.length - 1].frame);
+    setText(byId("frames", HTMLElement), `to ${frames[frames.length - 1].frame}`);
     const time = byId("time", HTMLElement);
-    setText(time, `${time_s.toFixed(3)} s · index ${frame}`);
+    setText(time, `${time_s.toFixed(3)} s · ${place + 1} of ${frames.length}`);
     time.title = `${stamp_ns} ns`;
     setText(byId("play", HTMLElement), this.player.playing ? "Pause" : "Play");
     setText(byId("zoom", HTMLElement), `${Math.round(app.viewer.view.scale * 100)} %`);
-    const doubtful = app.labels.doubtfulCount;
-    const line = byId("doubtful", HTMLElement);
-    setText(line, doubtful === 0 ? "none doubtful" : `${doubtful} doubtful`);
-    line.classList.toggle("none", doubtful === 0);
+    this.#drawProgress();
     const { hover } = app;
     setText(byId("readout", HTMLElement), hover ? `${hover.u.toFixed(1)}, ${hover.v.toFixed(1)}` : "");
     const picture = app.images.peek(frame);
@@ -95,14 +94,27 @@ export class Status {
     else this.notices.clear("size");
   }
 
+  /** What is left to do, and how much of the time is labelled. */
+  #drawProgress() {
+    const { app } = this;
+    const { doubtful, gaps } = app.tasks.count;
+    const tracking = app.labels.running.some(({ kind }) => kind === "track");
+    const line = byId("doubtful", HTMLElement);
+    const full = app.labels.names.length === 0 ? "no points yet" : tracking ? "tracking" : "every lane full";
+    setText(line, `${gaps === 0 ? full : gaps === 1 ? "1 gap" : `${gaps} gaps`}, ${doubtful === 0 ? "none" : doubtful} doubtful`);
+    line.classList.toggle("none", doubtful === 0 && gaps === 0);
+    setText(byId("coverage", HTMLElement), app.labels.names.length === 0 ? "" : coverageText(coverage(app.labels)));
+  }
+
   /** A point that left the image is offered a new place, once for each time it left. */
   #offerRespawn() {
     const { app } = this;
     const name = this.#gone();
-    if (name === null || !app.writable || app.respawning || this.player.playing) return this.notices.clear("respawn");
+    // What is to be done with the chosen point here stands in a banner of its own.
+    const guided = app.tasks.at(app.place, app.selected) !== null;
+    if (name === null || !app.writable || app.respawning || guided || this.player.playing) return this.notices.clear("respawn");
     const last = app.labels.lastUpTo(name, app.frame);
-    const at = last ? (app.labels.places.get(last.frame) ?? 0) + 1 : 0;
-    this.notices.banner("respawn", "info", `Point ${name} left the image after frame ${at}. Give it a new place here?`, [
+    this.notices.banner("respawn", "info", `Point ${name} left the image after frame ${last?.frame}. Give it a new place here?`, [
       [`Respawn ${name}`, () => {
         app.select(name);
         this.actions.respawn();
@@ -119,6 +131,7 @@ export class Status {
     const { app } = this;
     const gone = app.labels
       .goneAt(app.frame)
+      .filter((name) => !app.labels.saidEmpty(name, app.frame))
       .filter((name) => !app.declined.has(`${name} ${app.labels.lastUpTo(name, app.frame)?.frame}`));
     return gone.includes(app.selected) ? app.selected : (gone[0] ?? null);
   }

@@ -55,7 +55,7 @@ export function speak(app) {
       const at = app.cursor ?? app.pixel;
       const what = app.cursor ? "cursor" : `point ${app.selected}`;
       const where = at ? `at ${at.u.toFixed(1)}, ${at.v.toFixed(1)}` : "not labelled here";
-      setText(spoken, `Frame ${app.place + 1}, ${what} ${where}`);
+      setText(spoken, `Frame ${app.frame}, ${what} ${where}`);
     }, 500);
   });
 }

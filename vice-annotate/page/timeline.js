@@ -162,7 +162,7 @@ export class Timeline {
   #drawLanes(height, ratio) {
     const { app, canvas, lanes } = this;
     const { names } = app.labels;
-    const key = [app.labels.state.revision, app.selected, this.first, this.zoom, canvas.width, canvas.height, names.length, app.labels.doubtfulCount].join(" ");
+    const key = [app.labels.state.revision, app.selected, this.first, this.zoom, canvas.width, canvas.height, names.length, app.labels.heard, JSON.stringify(app.range)].join(" ");
     if (key === this.drawn && app.labels.lanes === this.drawnLanes) return;
     this.drawn = key;
     this.drawnLanes = app.labels.lanes;
@@ -202,9 +202,10 @@ export class Timeline {
     const { app, canvas } = this;
     const seen = app.labels.names.filter((name) => app.labels.at(name, app.frame));
     const points = seen.length === 0 ? "no point labelled" : `labelled: ${seen.join(", ")}`;
-    canvas.setAttribute("aria-valuemax", String(app.frames.length));
-    canvas.setAttribute("aria-valuenow", String(app.place + 1));
-    canvas.setAttribute("aria-valuetext", `frame ${app.place + 1} of ${app.frames.length}, ${points}`);
+    canvas.setAttribute("aria-valuemin", String(app.frames[0].frame));
+    canvas.setAttribute("aria-valuemax", String(app.frames[app.frames.length - 1].frame));
+    canvas.setAttribute("aria-valuenow", String(app.frame));
+    canvas.setAttribute("aria-valuetext", `frame ${app.frame}, ${app.place + 1} of ${app.frames.length}, ${points}`);
   }
 
   /**
@@ -266,6 +267,7 @@ export class Timeline {
     context.rect(NAMES, top, this.width - NAMES - 8, LANE);
     context.clip();
     const wide = this.#frameWidth;
+    this.#drawEmpty(context, name, top);
     for (const observation of app.labels.lanes.get(name)?.values() ?? []) {
       const place = app.labels.places.get(observation.frame);
       if (place === undefined) continue;
@@ -275,6 +277,30 @@ export class Timeline {
       if (place + 1 < app.frames.length && app.labels.lostAt(name, place + 1)) this.#drawLoss(context, x + wide, top, wide);
     }
     context.restore();
+  }
+
+  /**
+   * Stretches in which there is nothing to label, as a person says; and the first end of a range that is to be deleted.
+   * @param {CanvasRenderingContext2D} context
+   * @param {string} name
+   * @param {number} top
+   */
+  #drawEmpty(context, name, top) {
+    const { app } = this;
+    const middle = top + LANE / 2;
+    context.strokeStyle = "#7d8a95";
+    context.lineWidth = 2;
+    context.setLineDash([4, 4]);
+    for (const [from, to] of app.labels.empty.get(name) ?? []) {
+      context.beginPath();
+      context.moveTo(this.#x(app.labels.placeNear(from)) + 1, middle);
+      context.lineTo(this.#x(app.labels.placeNear(to) + 1) - 1, middle);
+      context.stroke();
+    }
+    context.setLineDash([]);
+    if (app.range?.name !== name) return;
+    context.fillStyle = DOUBT;
+    context.fillRect(this.#x(app.labels.placeNear(app.range.frame) + 0.5) - 1.5, top + 1, 3, LANE - 2);
   }
 
   /**

@@ -22,6 +22,8 @@
 
 /** @typedef {{frame: number, stamp_ns: string, time_s: number}} Frame */
 
+/** @typedef {{point: string, from: number, to: number}} Empty frames in which there is nothing to label, both ends among them */
+
 /**
  * @typedef {object} Job
  * @property {number | string} id
@@ -65,6 +67,7 @@
  * @property {string[]} streams
  * @property {Job[]} jobs
  * @property {string} version
+ * @property {Empty[]} [empty]
  * @property {Record<string, string[]>} [keys]
  * @property {number} [doubt_below]
  */
@@ -82,16 +85,18 @@
 
 /**
  * @typedef {{op: "place", point: string, frame: number, u: number, v: number}
+ *   | {op: "spawn", point: string, frame: number, u: number, v: number, suggested?: boolean}
  *   | {op: "mark", point: string, frame: number, occluded?: boolean, uncertain?: boolean, keyframe?: boolean}
  *   | {op: "delete", point: string, frame: number}
  *   | {op: "delete-after", point: string, frame: number}
+ *   | {op: "delete-range", point: string, frame: number, to: number}
  *   | {op: "remove-point", point: string}
  *   | {op: "rename", point: string, to: string}} Edit
  */
 
 /** @typedef {"forward" | "backward" | "both"} Direction */
 
-/** @typedef {{u: number, v: number, score: number, depth_m: number | null}} Suggestion */
+/** @typedef {{u: number, v: number, score: number, depth_m: number | null, stays_s: number | null}} Suggestion stays in view as far as can be told */
 
 /**
  * Where suggestions lie: on the floor as a scan or depth camera sees it; below the horizon, where that may be a wall;
@@ -115,5 +120,27 @@
 /** @typedef {{streams: Stream[], dots: Dot[], skips: {reason: string, count: number}[]}} Projections */
 
 /** @typedef {{u: number, v: number}} Pixel */
+
+/**
+ * What a reviewer said of an observation, and what the labels say.
+ * @typedef {{stored: Pixel, reviewed: Pixel | null, distance_px: number | null, source: Source}} Verdict
+ */
+
+/** @typedef {{point: string, frame: number, keyframe: {frame: number, u: number, v: number}, verdict: Verdict | null}} Sample */
+
+/** @typedef {{samples: number, placed: number, untold: number, median_px: number | null, p95_px: number | null, largest_px: number | null}} Summary */
+
+/**
+ * @typedef {object} ReviewState
+ * @property {string} dataset
+ * @property {string} camera
+ * @property {number} width
+ * @property {number} height
+ * @property {string} labels_file
+ * @property {string} review_file
+ * @property {number} outdated verdicts of labels that have changed since
+ * @property {Sample[]} samples
+ * @property {Summary} summary
+ */
 
 export {};

@@ -12,6 +12,7 @@ use vice_run::request::DepthName;
 use vice_run::request::{Request, is_auto};
 
 use crate::estimates::Estimates;
+use crate::notes::Notes;
 use crate::scene::SceneEstimates;
 use crate::store::{Checks, Store, Target, lock};
 
@@ -29,6 +30,8 @@ pub struct Desk {
     pub chosen: Vec<usize>,
     /// The labels.
     pub store: Arc<Mutex<Store>>,
+    /// What was said of lanes beside the labels.
+    pub notes: Mutex<Notes>,
     /// Pose streams and depth, where there are any.
     pub estimates: Option<Arc<dyn Estimates>>,
 }
@@ -56,6 +59,7 @@ impl Desk {
         let target =
             Target { dataset: opened.dataset.name(), camera: &opened.camera_name, frames: &opened.frames };
         let store = Store::open(&request.labels.file, &target)?;
+        let notes = Notes::open(store.path())?;
         let estimates = SceneEstimates::open(request, &opened, &chosen)?;
         Ok(Self {
             dataset: opened.dataset,
@@ -64,6 +68,7 @@ impl Desk {
             frames: opened.frames,
             chosen,
             store: Arc::new(Mutex::new(store)),
+            notes: Mutex::new(notes),
             estimates: estimates.map(|e| Arc::new(e) as Arc<dyn Estimates>),
         })
     }

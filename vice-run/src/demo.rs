@@ -126,6 +126,7 @@ fn evaluate_flight(
         time_offset_s: 0.0,
         align: evaluation.align.name().to_string(),
         label_noise_px: None,
+        tracking: None,
     };
     let document = ResultDocument::new(request(kept), used, evaluate(&evaluation, &|_, _| {})?);
     let verdicts = diagnose_estimates(&evaluation, progress)?;

@@ -18,6 +18,7 @@ use crate::open::Opened;
 use crate::progress::Progress;
 use crate::request::Request;
 use crate::streams::LoadedStreams;
+use crate::tracking_summary::TrackingSummary;
 
 /// What is looked for, and how.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -52,6 +53,9 @@ pub struct DiagnosisResult {
     pub request: Request,
     /// Seconds that were added to the estimate's stamps.
     pub time_offset_s: f64,
+    /// How the labels came about, where no person made them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tracking: Option<TrackingSummary>,
 }
 
 /// The answer for one estimate with one depth source.
@@ -83,7 +87,7 @@ pub fn diagnose_all(
     progress: &Progress<'_>,
 ) -> RunResult<Answers> {
     let flaws = looking.flaws();
-    request.with_evaluation(opened, false, progress, |evaluation, streams| {
+    request.with_evaluation(opened, false, progress, |evaluation, streams, tracking| {
         let mut answers = Vec::new();
         for stream in estimates(evaluation) {
             for depth in 0..evaluation.depths.len() {
@@ -100,6 +104,7 @@ pub fn diagnose_all(
                         diagnosis: found.document,
                         request: request.without_secrets(),
                         time_offset_s: evaluation.streams[stream].time_offset.as_secs_f64(),
+                        tracking: tracking.cloned(),
                     };
                     (result, calibration)
                 });
@@ -129,7 +134,7 @@ pub fn sensitivity_of(
     progress: &Progress<'_>,
 ) -> RunResult<(SensitivityDocument, Suspicions)> {
     let flaws = looking.flaws();
-    request.with_evaluation(opened, false, progress, |evaluation, streams| {
+    request.with_evaluation(opened, false, progress, |evaluation, streams, _| {
         let estimates = estimates(evaluation);
         let ([stream], [_]) = (estimates.as_slice(), evaluation.depths) else {
             return Err(RunError::usage("estimate", "a sensitivity takes one estimate and one depth source"));

@@ -6,7 +6,7 @@ use vice_core::label::LabelSet;
 use vice_core::suspicion::Suspicions;
 use vice_files::{address, labels};
 
-use crate::auto_labels::{self, TrackingSpec};
+use crate::auto_labels::{Remembered, TrackingSpec, labels_of};
 use crate::error::{Context, RunError, RunResult};
 use crate::label_noise::{put_into, read_floor};
 use crate::open::Opened;
@@ -16,6 +16,7 @@ use crate::request::{DepthName, DepthSpec, LabelsSpec, Request, points_asked};
 use crate::result::{OWN_ANCHOR, ResultDocument, Used};
 use crate::scene::Scene;
 use crate::streams::LoadedStreams;
+use crate::tracking_summary::TrackingSummary;
 
 /// Evaluates a request.
 ///
@@ -94,7 +95,20 @@ impl Request {
     /// # Errors
     /// [`RunError`] if they cannot be read or made.
     pub fn labels(&self, opened: &Opened, progress: &Progress<'_>) -> RunResult<(LabelSet, Suspicions)> {
-        let Some(points) = points_asked(&self.labels.file)? else { return self.labels.read(opened) };
+        let (labels, suspicions, _) = self.labels_and_tracking(opened, progress)?;
+        Ok((labels, suspicions))
+    }
+
+    /// The same, with how automatic ones came about.
+    fn labels_and_tracking(
+        &self,
+        opened: &Opened,
+        progress: &Progress<'_>,
+    ) -> RunResult<(LabelSet, Suspicions, Option<TrackingSummary>)> {
+        let Some(points) = points_asked(&self.labels.file)? else {
+            let (labels, suspicions) = self.labels.read(opened)?;
+            return Ok((labels, suspicions, None));
+        };
         let scene = Scene::of(opened.clone(), &self.streams.reference, self.streams.max_gap)?;
         let names = self.depth.names();
         // A point on the floor has depth by all sources; one elsewhere not by the floor.
@@ -108,9 +122,10 @@ impl Request {
             reference: self.streams.reference.clone(),
             max_gap: self.streams.max_gap,
         };
-        let made = auto_labels::labels_of(&spec, &scene, progress)?;
-        tracing::info!("{}", made.summary.replace('\n', "; "));
-        self.labels.chosen(made.labels, made.suspicions)
+        let Remembered { labels, summary, suspicions } = labels_of(&spec, &scene, progress)?;
+        tracing::info!("{}", summary.text().trim_end().replace('\n', "; "));
+        let (labels, suspicions) = self.labels.chosen(labels, suspicions)?;
+        Ok((labels, suspicions, Some(summary)))
     }
 
     /// Runs the pipeline on the recording.
@@ -128,7 +143,7 @@ impl Request {
         let label_noise_px = self.labels.noise.as_deref().map(read_floor).transpose()?;
         let (checks, not_made) = self.depth.make_checks(opened);
         let checks: Vec<&dyn DepthSource> = checks.iter().map(AsRef::as_ref).collect();
-        self.with_evaluation(opened, keep, progress, |evaluation, streams| {
+        self.with_evaluation(opened, keep, progress, |evaluation, streams, tracking| {
             let step = |done, total| progress("evaluating", done, total);
             let mut evaluation = *evaluation;
             evaluation.checks = &checks;
@@ -148,6 +163,7 @@ impl Request {
                 time_offset_s: streams.time_offset.as_secs_f64(),
                 align: evaluation.align.name().to_string(),
                 label_noise_px,
+                tracking: tracking.cloned(),
             };
             if let Some(floor_px) = label_noise_px {
                 found.pixel.iter_mut().for_each(|part| put_into(part, floor_px));
@@ -165,9 +181,9 @@ impl Request {
         opened: &Opened,
         keep_samples: bool,
         progress: &Progress<'_>,
-        work: impl FnOnce(&Evaluation<'_>, &LoadedStreams) -> RunResult<T>,
+        work: impl FnOnce(&Evaluation<'_>, &LoadedStreams, Option<&TrackingSummary>) -> RunResult<T>,
     ) -> RunResult<T> {
-        let (labels, in_labels_file) = self.labels(opened, progress)?;
+        let (labels, in_labels_file, tracking) = self.labels_and_tracking(opened, progress)?;
         let in_labels = |error: EvaluateError| match error {
             EvaluateError::Data(error) => RunError::from(error),
             error => match Err::<(), _>(error)
@@ -207,6 +223,6 @@ impl Request {
             .align(self.scoring.align.unwrap_or_default())
             .keep_samples(keep_samples)
             .build();
-        work(&evaluation, &streams)
+        work(&evaluation, &streams, tracking.as_ref())
     }
 }

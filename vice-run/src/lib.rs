@@ -52,6 +52,7 @@ pub mod scene;
 pub mod sources;
 pub mod streams;
 pub mod text;
+pub mod tracking_summary;
 pub mod trajectory;
 
 pub use evaluation::{Samples, evaluate_request};

@@ -46,3 +46,8 @@ pub use suggest::{SuggestOptions, Suggestion, suggest};
 
 /// Name and version of the tracker, for the labels that it made. It changes whenever its results may.
 pub const TRACKER_VERSION: &str = "vice-klt/1";
+
+/// The number in [`TRACKER_VERSION`], as labels carry it.
+pub fn tracker_version() -> Option<u32> {
+    TRACKER_VERSION.rsplit_once('/')?.1.parse().ok()
+}

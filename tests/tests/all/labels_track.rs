@@ -241,6 +241,10 @@ fn automatic_labels_are_made_where_an_evaluation_asks_for_them() {
     let first = folder.path().join("first.json");
     let said = evaluate("evaluate", "auto:12", &[]);
     assert!(good(&said).contains("labels: automatic, 12 points"), "{}", said.stdout);
+    // What was followed is told with the numbers, in words and in the document.
+    for words in ["12 points, zcam", "points followed", "of the points move as one scene"] {
+        assert!(said.stdout.contains(words), "`{words}` is not in: {}", said.stdout);
+    }
     good(&evaluate("evaluate", "auto:12", &["--json", text(&first)]));
     let kept: Vec<_> = std::fs::read_dir(cache.join("labels")).unwrap().map(|f| f.unwrap().path()).collect();
     assert_eq!(kept.len(), 1, "{kept:?}");
@@ -249,6 +253,17 @@ fn automatic_labels_are_made_where_an_evaluation_asks_for_them() {
     good(&evaluate("evaluate", "auto:12", &["--json", text(&second)]));
     assert!(std::fs::read(&first).unwrap() == std::fs::read(&second).unwrap(), "not the same from the cache");
     assert_eq!(json(&first)["request"]["labels"]["file"], "auto:12");
+    let tracking = &json(&first)["used"]["tracking"];
+    let count = |name: &str| tracking[name].as_u64().unwrap_or_else(|| panic!("no {name}: {tracking}"));
+    assert_eq!((count("points"), count("frames_undecoded")), (12, 0));
+    assert!(count("followed") >= 60 && count("labels") <= count("labels_possible"), "{tracking}");
+    assert!(tracking["one_motion"]["median_percent"].as_f64().unwrap() > 75.0, "{tracking}");
+    let ended = tracking["ended"].as_object().unwrap();
+    let named: Vec<&str> = ended.keys().map(String::as_str).collect();
+    assert_eq!(named, ["doubtful", "left_image", "lost", "moved_apart", "no_way_back"]);
+    let by_hand = folder.path().join("by_hand.json");
+    good(&evaluate("evaluate", text(&flight.join("labels/scene.csv")), &["--json", text(&by_hand)]));
+    assert!(json(&by_hand)["used"]["tracking"].is_null(), "labels of a file were not tracked by VICE now");
     // What is broken is made anew, and the same.
     std::fs::write(&kept[0], b"{").unwrap();
     good(&evaluate("evaluate", "auto:12", &["--json", text(&second)]));
@@ -370,4 +385,68 @@ fn tracks_of_other_tools_become_labels() {
     // Where labels are asked for, the way there is told.
     let direct = vice(&["evaluate", text(&flight), "--labels", text(&tracks), "--estimate", "ground-truth"]);
     assert!(direct.code == 1 && direct.stderr.contains("vice labels convert"), "{}", direct.stderr);
+}
+
+/// Automatic labels and exact ones of the same points and segments say the same of each estimate: a small sample of
+/// `tests/verdict/auto_labels.py`, which judges five flights of 30 s by ten estimates each.
+#[test]
+fn automatic_labels_give_the_verdict_of_exact_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let flight = flight(folder.path());
+    let followed = folder.path().join("followed.json");
+    good(&vice(&["labels", "track", text(&flight), "--points", "20", "--out", text(&followed)]));
+    // Where the true poses carry each key frame's point.
+    let true_places = folder.path().join("true.json");
+    let truth = ["--estimate", "ground-truth", "--reference", "none", "--depth", "zcam", "--json"];
+    good(&vice(
+        &[&["evaluate", text(&flight), "--labels", text(&followed)][..], &truth, &[text(&true_places)]]
+            .concat(),
+    ));
+    let samples = json(&true_places)["pixel"][0]["samples"].clone();
+    let place = |point: &Value, stamp: &Value| {
+        let list = samples.as_array().unwrap();
+        list.iter()
+            .find(|s| s["point"] == *point && s["timestamp_ns"] == *stamp)
+            .map(|s| s["tracked_px"].clone())
+    };
+    let (mut auto, mut exact) = (json(&followed), json(&followed));
+    for (document, moved) in [(&mut auto, false), (&mut exact, true)] {
+        for point in document["points"].as_array_mut().unwrap() {
+            let name = point["name"].clone();
+            let observations = point["observations"].as_array_mut().unwrap();
+            observations.retain_mut(|o| match place(&name, &o["timestamp_ns"]) {
+                Some(px) => {
+                    if moved {
+                        o["px"] = px;
+                    }
+                    true
+                }
+                None => o["keyframe"] == true,
+            });
+        }
+    }
+    let rmse = |name: &str, document: &Value| -> Vec<(String, f64)> {
+        let (labels, out) = (folder.path().join(name), folder.path().join(format!("{name}.result")));
+        std::fs::write(&labels, document.to_string()).unwrap();
+        let estimates: Vec<String> = ["drift", "clock-offset", "wrong-extrinsic", "white-noise"]
+            .map(|e| text(&flight.join(format!("estimates/{e}.txt"))).to_string())
+            .to_vec();
+        let words =
+            ["evaluate", text(&flight), "--labels", text(&labels), "--estimate", &estimates.join(",")];
+        good(&vice(&[&words[..], &["--depth", "zcam", "--json", text(&out)]].concat()));
+        let parts = json(&out)["pixel"].as_array().unwrap().clone();
+        let judged = parts.iter().filter(|p| p["role"] == "estimate");
+        let mut rmse: Vec<(String, f64)> = judged
+            .map(|p| (p["stream"].as_str().unwrap().to_string(), p["pooled_rmse_px"].as_f64().unwrap()))
+            .collect();
+        rmse.sort_by(|a, b| a.1.total_cmp(&b.1));
+        rmse
+    };
+    let (auto, exact) = (rmse("auto.json", &auto), rmse("exact.json", &exact));
+    assert_eq!(auto.len(), 4);
+    for ((name, by_auto), (exact_name, by_exact)) in auto.iter().zip(&exact) {
+        assert_eq!(name, exact_name, "in another order: {auto:?} {exact:?}");
+        let far_px = (by_auto - by_exact).abs();
+        assert!(far_px <= (0.05 * by_exact).max(0.3), "{name}: {by_auto} px, by exact labels {by_exact} px");
+    }
 }

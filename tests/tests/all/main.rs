@@ -5,6 +5,7 @@
 
 mod annotate;
 mod annotate_detect;
+mod annotate_guide;
 mod annotate_kill;
 mod annotate_reach;
 mod annotator;

@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use vice_core::camera::Pixel;
 use vice_core::label::{Observation, ObservationSource, Provenance};
+use vice_core::time::Stamp;
 
 use crate::desk::Desk;
 use crate::store::{Cell, Document};
-use vice_track::{DOUBT_CONFIDENCE, Outcome, PointTrack, Pyramid, TRACKER_VERSION, TrackError, TrackOptions};
+use vice_track::{DOUBT_CONFIDENCE, Outcome, PointTrack, Pyramid, TrackError, TrackOptions, tracker_version};
 
 /// A point on its way through the frames.
 pub(super) struct Lane {
@@ -23,6 +24,8 @@ pub(super) struct Lane {
     pub(super) fate: Option<Fate>,
     /// Nothing more is to be done for it.
     pub(super) over: bool,
+    /// What was written, in the order in which it was visited, with whether it is doubtful.
+    written: Vec<(Stamp, bool)>,
 }
 
 /// What is known of a frame.
@@ -62,6 +65,7 @@ impl Lane {
             expected: Some(px),
             fate: None,
             over: false,
+            written: Vec::new(),
         })
     }
 
@@ -135,13 +139,16 @@ impl Lane {
             let after = match found {
                 Found::Here { px, confidence, seeded } if there.is_some() || desk.is_chosen(frame) => {
                     // The window may reach into the image while the point itself does not.
-                    desk.camera.contains(px).then(|| Observation {
+                    let doubtful = confidence < DOUBT_CONFIDENCE;
+                    let inside = desk.camera.contains(px);
+                    self.written.extend(inside.then_some((stamp, doubtful)));
+                    inside.then(|| Observation {
                         source: ObservationSource::Auto,
                         occluded: there.is_some_and(|o| o.occluded),
-                        uncertain: confidence < DOUBT_CONFIDENCE,
+                        uncertain: doubtful,
                         provenance: Provenance {
                             confidence: Some(confidence.clamp(0.0, 1.0)),
-                            tracker_version: version(),
+                            tracker_version: tracker_version(),
                             seeded,
                         },
                         ..Observation::manual(stamp, px)
@@ -157,12 +164,30 @@ impl Lane {
     }
 }
 
+impl Lane {
+    /// The cells that make the way back from a key frame a segment of its own: without a key frame ahead of it, what lies before
+    /// the one where tracking started would be taken for what the segment before is of. Doubtful observations at its far end
+    /// go, since a key frame says what all others are of.
+    pub(super) fn headed(&self, document: &Document, desk: &Desk) -> Vec<Cell> {
+        let from = document.get(&self.point, desk.frames[self.start.0]);
+        if from.is_none_or(|o| !o.keyframe) {
+            return vec![];
+        }
+        let there = |stamp: &Stamp| document.get(&self.point, *stamp).filter(|o| !holds(o));
+        let far_first = self.written.iter().rev().filter(|(stamp, _)| there(stamp).is_some());
+        let mut cells = Vec::new();
+        for (stamp, doubtful) in far_first {
+            let after = if *doubtful { None } else { there(stamp).map(|o| o.as_keyframe()) };
+            cells.extend(document.cell(&self.point, *stamp, after));
+            if !doubtful {
+                break;
+            }
+        }
+        cells
+    }
+}
+
 /// Whether an observation is not the tracker's to change: a person's, a detector's, or the start of a segment.
 fn holds(o: &Observation) -> bool {
     o.keyframe || matches!(o.source, ObservationSource::Manual | ObservationSource::Detected)
-}
-
-/// The number in the tracker's name and version.
-fn version() -> Option<u32> {
-    TRACKER_VERSION.rsplit_once('/')?.1.parse().ok()
 }

@@ -10,7 +10,7 @@ use vice_core::error::{DataResult, one_line};
 use super::lane::{Fate, Lane};
 use super::{Direction, EndReason, Job, LaneEnd, Listener, Progress, TrackRequest};
 use crate::desk::Desk;
-use crate::store::{By, StoreError};
+use crate::store::{By, Cell, Document, StoreError};
 use vice_track::Pyramid;
 
 /// How often what was found is written and told.
@@ -101,6 +101,9 @@ impl Runner<'_> {
         for (way, frames) in legs(self.desk, self.request).into_iter().enumerate() {
             let mut lanes = self.lanes(&image, way)?;
             self.leg(&mut lanes, &frames, &mut done)?;
+            if frames.first().is_some_and(|f| *f < start) {
+                self.commit(|document, desk| lanes.iter().flat_map(|l| l.headed(document, desk)).collect())?;
+            }
             let ends: Vec<LaneEnd> = lanes.iter().filter_map(|lane| self.end(lane, &frames)).collect();
             self.ends.extend(ends);
         }
@@ -184,20 +187,23 @@ impl Runner<'_> {
     /// have been an undo.
     fn write(&mut self, lanes: &mut [Lane], done: usize) -> Result<(), String> {
         self.last_batch = Instant::now();
+        self.commit(|document, desk| lanes.iter_mut().flat_map(|lane| lane.cells(document, desk)).collect())?;
+        self.job.update(self.listener, |state| state.done = done);
+        Ok(())
+    }
+
+    fn commit(&self, cells: impl FnOnce(&Document, &Desk) -> Vec<Cell>) -> Result<(), String> {
         let mut store = self.desk.store();
         if self.job.is_stopped() {
             return Ok(());
         }
-        let document = store.document();
-        let cells: Vec<_> = lanes.iter_mut().flat_map(|lane| lane.cells(document, self.desk)).collect();
+        let cells = cells(store.document(), self.desk);
         let id = self.job.state().id;
         let committed = store.commit(By::Track, self.label(), Some(id), cells);
         let changed = committed.map_err(|e: StoreError| one_line(&e))?;
         if !changed.points.is_empty() {
             self.listener.changed(&store, &changed);
         }
-        drop(store);
-        self.job.update(self.listener, |state| state.done = done);
         Ok(())
     }
 

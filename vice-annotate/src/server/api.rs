@@ -13,25 +13,23 @@ use base64::engine::general_purpose::STANDARD;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::json;
-use vice_core::camera::Pixel;
+use vice_core::error::one_line;
 
 use super::App;
 use super::error::ApiError;
-use super::wire::{ChangeWire, FrameWire, StateWire, points};
-use crate::desk::Desk;
+use super::wire::{ChangeWire, FrameWire, StateWire, empty, points};
 use crate::exchange::{Exchange, ImportError, import};
 use crate::jobs::{Accepted, DetectRequest, JobState, Jobs, Listener, TrackRequest};
+use crate::notes::Stretch;
 use crate::store::{By, Changed, Edit, Store, StoreError, lock};
-use vice_track::{DOUBT_CONFIDENCE, Pyramid, SuggestOptions, suggest};
+use vice_track::DOUBT_CONFIDENCE;
 
 /// Edits of one request at most.
 const MAX_EDITS: usize = 10_000;
-/// Suggestions of one request at most.
-const MAX_SUGGESTIONS: usize = 64;
 
-type Answer = Result<Response, ApiError>;
-type Shared = State<Arc<App>>;
-type Body = Result<Bytes, BytesRejection>;
+pub(super) type Answer = Result<Response, ApiError>;
+pub(super) type Shared = State<Arc<App>>;
+pub(super) type Body = Result<Bytes, BytesRejection>;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -41,14 +39,17 @@ struct EditsRequest {
 }
 
 #[derive(Deserialize)]
-struct RevisionRequest {
-    revision: u64,
+#[serde(deny_unknown_fields)]
+struct NoteRequest {
+    point: String,
+    from: usize,
+    to: usize,
+    nothing: bool,
 }
 
 #[derive(Deserialize)]
-pub(super) struct SuggestQuery {
-    frame: usize,
-    count: Option<usize>,
+struct RevisionRequest {
+    revision: u64,
 }
 
 #[derive(Deserialize)]
@@ -100,6 +101,7 @@ pub(super) async fn state(State(app): Shared) -> Answer {
             can_redo: store.can_redo(),
             floor_suggestions: desk.estimates.as_ref().is_some_and(|e| e.uses_floor()),
             depth_known: desk.estimates.is_some(),
+            empty: empty(&lock(&desk.notes), &desk.frames),
             streams: desk.estimates.as_ref().map(|e| e.streams()).unwrap_or_default(),
             jobs: app.jobs.states(),
             doubt_below: DOUBT_CONFIDENCE,
@@ -136,7 +138,37 @@ pub(super) async fn edits(State(app): Shared, body: Body) -> Answer {
     if request.edits.len() > MAX_EDITS {
         return Err(ApiError::bad(format!("{} edits are more than {MAX_EDITS}", request.edits.len())));
     }
-    app.change(move |app, store| store.edit(request.revision, &request.edits, &app.desk.checks())).await
+    app.change(move |app, store| {
+        let changed = store.edit(request.revision, &request.edits, &app.desk.checks())?;
+        for edit in &request.edits {
+            let Edit::Rename { point, to } = edit else { continue };
+            // The labels have the new name already: a note that is lost is told, and can be said again.
+            if let Err(error) = lock(&app.desk.notes).rename(point, to) {
+                tracing::warn!("what was said of {point} is not said of {to}: {}", one_line(&error));
+            }
+        }
+        Ok(changed)
+    })
+    .await
+}
+
+/// That there is nothing to label of a point from one frame to another, or that this no longer holds.
+pub(super) async fn note(State(app): Shared, body: Body) -> Answer {
+    let request: NoteRequest = parse(body)?;
+    app.blocking(move |app| {
+        let desk = &app.desk;
+        if let Some(reason) = desk.read_only() {
+            return Err(StoreError::ReadOnly(reason).into());
+        }
+        let (from, to) = (desk.checks().stamp(request.from)?, desk.checks().stamp(request.to)?);
+        let mut notes = lock(&desk.notes);
+        notes.say(&request.point, Stretch { from, to }, request.nothing)?;
+        let empty = json!({ "empty": empty(&notes, &desk.frames) });
+        // While the notes are locked: windows hear of them in order.
+        app.hub.tell("notes", &empty);
+        Ok(Json(empty).into_response())
+    })
+    .await
 }
 
 pub(super) async fn undo(State(app): Shared, body: Body) -> Answer {
@@ -178,54 +210,6 @@ pub(super) async fn stop(State(app): Shared, Path(job): Path<u64>) -> Answer {
     } else {
         Err(ApiError::new(StatusCode::NOT_FOUND, format!("there is no job {job}")))
     }
-}
-
-pub(super) async fn suggestions(State(app): Shared, Query(query): Query<SuggestQuery>) -> Answer {
-    let count = query.count.unwrap_or(4).min(MAX_SUGGESTIONS);
-    app.blocking(move |app| {
-        let desk = &app.desk;
-        let stamp = desk.checks().stamp(query.frame)?;
-        let image = Pyramid::for_tracking(&desk.dataset.image(&desk.camera_name, query.frame)?)?;
-        let taken: Vec<Pixel> = {
-            let store = desk.store();
-            store.document().points().filter_map(|(_, o)| Some(o.get(&stamp)?.px)).collect()
-        };
-        let depth = |pixels: &[Pixel]| -> Option<Vec<Option<f64>>> {
-            desk.estimates.as_ref()?.depths(query.frame, pixels).ok()
-        };
-        // Where no stream has a pose there is no depth either.
-        let has_depth = |px: Pixel| {
-            desk.estimates.is_none() || depth(&[px]).is_some_and(|z| z.iter().all(Option::is_some))
-        };
-        let floor = FloorMask::new(desk, query.frame);
-        let on_floor = |px: Pixel| floor.as_ref().is_none_or(|f| f.holds(px)) && has_depth(px);
-        // Points off the floor are better than none, and so are those without depth: another frame may know it.
-        let on_surest = match (&desk.estimates, &floor) {
-            (None, _) => "any",
-            (Some(_), Some(_)) => "floor",
-            (Some(e), None) if e.uses_floor() => "below-horizon",
-            (Some(_), None) => "depth",
-        };
-        let accepts: [(&str, &dyn Fn(Pixel) -> bool); 3] =
-            [(on_surest, &on_floor), ("depth", &has_depth), ("any", &|_| true)];
-        let (lie, found) = accepts
-            .into_iter()
-            .map(|(lie, accept)| {
-                let options = SuggestOptions { taken: &taken, accept, ..SuggestOptions::default() };
-                (lie, suggest(&image, count, &options))
-            })
-            .find(|(_, found)| !found.is_empty())
-            .unwrap_or(("any", vec![]));
-        let pixels: Vec<Pixel> = found.iter().map(|s| s.px).collect();
-        let depths = depth(&pixels).unwrap_or_else(|| vec![None; pixels.len()]);
-        let list: Vec<_> = found
-            .iter()
-            .zip(depths)
-            .map(|(s, z)| json!({ "u": s.px.u, "v": s.px.v, "score": s.score, "depth_m": z }))
-            .collect();
-        Ok(Json(json!({ "suggestions": list, "lie": lie })).into_response())
-    })
-    .await
 }
 
 pub(super) async fn projections(State(app): Shared) -> Answer {
@@ -283,41 +267,9 @@ pub(super) async fn bring_in(State(app): Shared, Query(query): Query<FormatQuery
     .await
 }
 
-/// Where a frame shows the floor, on a grid: asking for each corner by itself would be slow.
-struct FloorMask {
-    columns: usize,
-    on: Vec<bool>,
-}
-
-impl FloorMask {
-    /// Pixels from one place of the grid to the next.
-    const STEP: u32 = 8;
-
-    fn new(desk: &Desk, frame: usize) -> Option<Self> {
-        let steps = |side: u32| (0..side).step_by(Self::STEP as usize).map(f64::from);
-        let columns = steps(desk.camera.width()).count();
-        let grid: Vec<Pixel> = steps(desk.camera.height())
-            .flat_map(|v| steps(desk.camera.width()).map(move |u| Pixel::new(u, v)))
-            .collect();
-        let on = desk.estimates.as_ref()?.on_floor(frame, &grid)?;
-        Some(Self { columns, on })
-    }
-
-    /// Whether the floor is seen on all sides of a pixel.
-    fn holds(&self, px: Pixel) -> bool {
-        let step = f64::from(Self::STEP);
-        let (column, row) = ((px.u.max(0.0) / step) as usize, (px.v.max(0.0) / step) as usize);
-        let at = |c: usize, r: usize| {
-            let place = r * self.columns + c.min(self.columns.saturating_sub(1));
-            self.on.get(place).or(self.on.last()).copied().unwrap_or(false)
-        };
-        [(0, 0), (1, 0), (0, 1), (1, 1)].iter().all(|(c, r)| at(column + c, row + r))
-    }
-}
-
 impl App {
     /// Runs what may wait for the disk or the processor apart from the server's own thread.
-    async fn blocking<F>(self: &Arc<Self>, work: F) -> Answer
+    pub(super) async fn blocking<F>(self: &Arc<Self>, work: F) -> Answer
     where
         F: FnOnce(&Self) -> Answer + Send + 'static,
     {
@@ -383,11 +335,13 @@ impl App {
     }
 }
 
-async fn spawn<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, ApiError> {
+pub(super) async fn spawn<T: Send + 'static>(
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, ApiError> {
     tokio::task::spawn_blocking(work).await.map_err(ApiError::internal)
 }
 
-fn parse<T: DeserializeOwned>(body: Body) -> Result<T, ApiError> {
+pub(super) fn parse<T: DeserializeOwned>(body: Body) -> Result<T, ApiError> {
     let bytes = body.map_err(|e| ApiError::new(e.status(), e.body_text()))?;
     serde_json::from_slice(&bytes).map_err(|e| ApiError::bad(format!("the request is not understood: {e}")))
 }

@@ -46,7 +46,7 @@ impl Hub {
         self.saver
     }
 
-    fn tell(&self, name: &'static str, what: &impl serde::Serialize) {
+    pub(super) fn tell(&self, name: &'static str, what: &impl serde::Serialize) {
         match serde_json::to_string(what) {
             // No window is open: nobody to tell.
             Ok(text) => drop(self.sender.send((name, text.into()))),

@@ -8,6 +8,8 @@ mod error;
 mod events;
 mod frames;
 mod guard;
+mod review;
+mod suggestions;
 mod wire;
 
 use std::collections::BTreeMap;
@@ -27,6 +29,8 @@ use vice_core::error::{DataError, DataResult};
 
 use crate::desk::Desk;
 use crate::jobs::Jobs;
+use crate::review::{Review, Summary};
+use crate::store::lock;
 use error::ApiError;
 use events::Hub;
 use frames::Frames;
@@ -50,6 +54,8 @@ pub struct ServerOptions {
     pub port: u16,
     /// Keys that replace the page's own, by action.
     pub keys: BTreeMap<String, Vec<String>>,
+    /// So many observations are reviewed, blind; `None`: labels are made.
+    pub review: Option<usize>,
 }
 
 /// Everything that requests share.
@@ -61,6 +67,7 @@ struct App {
     frames: Frames,
     keys: BTreeMap<String, Vec<String>>,
     projections: Mutex<Option<(u64, Arc<str>)>>,
+    review: Option<Mutex<Review>>,
     closing: watch::Sender<bool>,
     guard: Arc<Guard>,
 }
@@ -69,19 +76,32 @@ struct App {
 /// address, which holds the token.
 ///
 /// # Errors
-/// [`DataError`] if the address cannot be used, or at the end if the labels file cannot be written.
-pub fn serve(desk: Desk, options: &ServerOptions, ready: impl FnOnce(&str)) -> DataResult<()> {
+/// [`DataError`] if the address cannot be used, there is nothing to review where that is asked for, or at the end if the
+/// labels file cannot be written.
+pub fn serve(desk: Desk, options: &ServerOptions, ready: impl FnOnce(&str)) -> DataResult<Option<Summary>> {
+    let review = options.review.map(|count| Review::open(&desk, count)).transpose()?;
+    if let Some(review) = review.as_ref().filter(|r| r.outdated() > 0) {
+        let (outdated, path) = (review.outdated(), review.path().display());
+        tracing::warn!(
+            "{path}: {outdated} of its verdicts are on labels that have changed since, and do not count"
+        );
+    }
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
         .map_err(|e| DataError::new("the server cannot be started").because(e))?;
-    let outcome = runtime.block_on(run(desk, options, ready));
+    let outcome = runtime.block_on(run(desk, review, options, ready));
     // A frame that is just being decoded is not waited for.
     runtime.shutdown_timeout(GRACE);
     outcome
 }
 
-async fn run(desk: Desk, options: &ServerOptions, ready: impl FnOnce(&str)) -> DataResult<()> {
+async fn run(
+    desk: Desk,
+    review: Option<Review>,
+    options: &ServerOptions,
+    ready: impl FnOnce(&str),
+) -> DataResult<Option<Summary>> {
     let wanted = SocketAddr::new(options.bind, options.port);
     let failed = |e: std::io::Error| {
         let error = DataError::new(format!("cannot listen on {wanted}"));
@@ -114,6 +134,7 @@ async fn run(desk: Desk, options: &ServerOptions, ready: impl FnOnce(&str)) -> D
         frames: Frames::new(Arc::clone(&desk.dataset), desk.camera_name.clone(), size),
         keys: options.keys.clone(),
         projections: Mutex::default(),
+        review: review.map(Mutex::new),
         closing: watch::Sender::new(false),
         guard: Arc::new(Guard { token, address }),
         desk,
@@ -133,8 +154,9 @@ async fn run(desk: Desk, options: &ServerOptions, ready: impl FnOnce(&str)) -> D
         } => Ok(()),
     };
     app.jobs.stop_all();
+    let summary = app.review.as_ref().map(|review| lock(review).summary());
     finish(app).await?;
-    result.map_err(|e| DataError::new("the server ended").because(e))
+    result.map(|()| summary).map_err(|e| DataError::new("the server ended").because(e))
 }
 
 /// Waits for the jobs to let go of the labels, and saves them.
@@ -157,22 +179,12 @@ async fn finish(app: Arc<App>) -> DataResult<()> {
 }
 
 fn router(app: &Arc<App>) -> Router {
-    Router::new()
+    // Who reviews is given no label before it has been judged: what could tell them is not even served.
+    let routes = if app.review.is_some() { review_routes() } else { label_routes() };
+    routes
         .route("/", get(page))
         .route("/{file}", get(file))
-        .route("/api/state", get(api::state))
         .route("/api/frames/{frame}", get(api::frame))
-        .route("/api/events", get(api::events))
-        .route("/api/edits", post(api::edits))
-        .route("/api/undo", post(api::undo))
-        .route("/api/redo", post(api::redo))
-        .route("/api/track", post(api::track))
-        .route("/api/track/{job}", delete(api::stop))
-        .route("/api/detect", post(api::detect))
-        .route("/api/suggestions", get(api::suggestions))
-        .route("/api/projections", get(api::projections))
-        .route("/api/export", get(api::export))
-        .route("/api/import", post(api::bring_in).layer(DefaultBodyLimit::max(MAX_IMPORT)))
         .fallback(|| async { ApiError::new(StatusCode::NOT_FOUND, "there is nothing here") })
         .method_not_allowed_fallback(|| async {
             ApiError::new(StatusCode::METHOD_NOT_ALLOWED, "this is not how it is asked for")
@@ -182,8 +194,29 @@ fn router(app: &Arc<App>) -> Router {
         .with_state(Arc::clone(app))
 }
 
+fn review_routes() -> Router<Arc<App>> {
+    Router::new().route("/api/review", get(review::review).post(review::say))
+}
+
+fn label_routes() -> Router<Arc<App>> {
+    Router::new()
+        .route("/api/state", get(api::state))
+        .route("/api/events", get(api::events))
+        .route("/api/edits", post(api::edits))
+        .route("/api/notes", post(api::note))
+        .route("/api/undo", post(api::undo))
+        .route("/api/redo", post(api::redo))
+        .route("/api/track", post(api::track))
+        .route("/api/track/{job}", delete(api::stop))
+        .route("/api/detect", post(api::detect))
+        .route("/api/suggestions", get(suggestions::suggestions))
+        .route("/api/projections", get(api::projections))
+        .route("/api/export", get(api::export))
+        .route("/api/import", post(api::bring_in).layer(DefaultBodyLimit::max(MAX_IMPORT)))
+}
+
 async fn page(State(app): State<Arc<App>>) -> Result<Response, ApiError> {
-    asset(&app, "")
+    asset(&app, if app.review.is_some() { "review.html" } else { "" })
 }
 
 async fn file(State(app): State<Arc<App>>, Path(name): Path<String>) -> Result<Response, ApiError> {

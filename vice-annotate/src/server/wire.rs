@@ -7,6 +7,7 @@ use vice_core::label::{Observation, ObservationSource};
 use vice_core::time::Stamp;
 
 use crate::jobs::JobState;
+use crate::notes::{Notes, Stretch};
 use crate::store::{Changed, Document, Store};
 
 /// One observation.
@@ -41,6 +42,24 @@ pub(super) struct FrameWire {
     pub(super) time_s: f64,
 }
 
+/// Frames in which a person says there is nothing to label of a point, both ends among them.
+#[derive(Debug, Serialize)]
+pub(super) struct EmptyWire {
+    point: String,
+    from: usize,
+    to: usize,
+}
+
+/// What was said to be empty, in frames: a stretch without any is left out.
+pub(super) fn empty(notes: &Notes, frames: &[Stamp]) -> Vec<EmptyWire> {
+    let one = |point: &str, stretch: &Stretch| {
+        let from = frames.partition_point(|f| *f < stretch.from);
+        let to = frames.partition_point(|f| *f <= stretch.to).checked_sub(1)?;
+        (from <= to).then(|| EmptyWire { point: point.to_string(), from, to })
+    };
+    notes.empty().iter().flat_map(|(point, list)| list.iter().filter_map(move |s| one(point, s))).collect()
+}
+
 /// All that the page starts from.
 #[derive(Debug, Serialize)]
 pub(super) struct StateWire<'a> {
@@ -60,6 +79,7 @@ pub(super) struct StateWire<'a> {
     pub(super) can_redo: bool,
     pub(super) floor_suggestions: bool,
     pub(super) depth_known: bool,
+    pub(super) empty: Vec<EmptyWire>,
     pub(super) streams: Vec<String>,
     pub(super) jobs: Vec<JobState>,
     pub(super) doubt_below: f64,

@@ -7,6 +7,8 @@ use vice_core::label::{Observation, ObservationSource, Provenance};
 use vice_core::time::Stamp;
 
 use super::document::{Cell, Document};
+use super::segments;
+use vice_track::tracker_version;
 
 /// Characters a point's name may have.
 const MAX_NAME: usize = 64;
@@ -27,6 +29,20 @@ pub enum Edit {
         u: f64,
         /// Downwards, pixels.
         v: f64,
+    },
+    /// Begins a segment: of a new point, or of one that goes on elsewhere in the scene. See [`super::segments`].
+    Spawn {
+        /// The point, new or not.
+        point: String,
+        /// The frame.
+        frame: usize,
+        /// To the right, pixels.
+        u: f64,
+        /// Downwards, pixels.
+        v: f64,
+        /// The place is the tracker's suggestion, taken as one of many: nobody has looked at it by itself.
+        #[serde(default)]
+        suggested: bool,
     },
     /// Sets marks of an observation; those that are not given stay.
     Mark {
@@ -55,6 +71,15 @@ pub enum Edit {
         /// The frame.
         frame: usize,
     },
+    /// Deletes the observations from one frame to another, both among them.
+    DeleteRange {
+        /// The point.
+        point: String,
+        /// The first frame.
+        frame: usize,
+        /// The last frame.
+        to: usize,
+    },
     /// Deletes a point.
     RemovePoint {
         /// The point.
@@ -82,9 +107,11 @@ impl Edit {
     pub fn label(&self) -> String {
         match self {
             Self::Place { point, frame, .. } => format!("place {point} in frame {frame}"),
+            Self::Spawn { point, frame, .. } => format!("begin {point} in frame {frame}"),
             Self::Mark { point, frame, .. } => format!("mark {point} in frame {frame}"),
             Self::Delete { point, frame } => format!("delete {point} in frame {frame}"),
             Self::DeleteAfter { point, frame } => format!("delete {point} after frame {frame}"),
+            Self::DeleteRange { point, frame, to } => format!("delete {point} from frame {frame} to {to}"),
             Self::RemovePoint { point } => format!("remove point {point}"),
             Self::Rename { point, to } => format!("rename {point} to {to}"),
         }
@@ -109,17 +136,28 @@ impl Edit {
                         ..*o
                     },
                     None => {
-                        let first = document.point(point).is_none();
-                        if first {
-                            check_name(point)?;
-                            if document.points().len() >= MAX_POINTS {
-                                return Err(DataError::new(format!("there are {MAX_POINTS} points already")));
-                            }
-                        }
+                        let first = check_new(document, point)?;
                         Observation { keyframe: first, ..Observation::manual(stamp, px) }
                     }
                 };
                 Ok(document.cell(point, stamp, Some(placed)).into_iter().collect())
+            }
+            Self::Spawn { point, frame, u, v, suggested } => {
+                let stamp = checks.stamp(*frame)?;
+                let placed = Observation::manual(stamp, checks.pixel(*u, *v)?);
+                check_new(document, point)?;
+                let placed = match suggested {
+                    true => Observation {
+                        source: ObservationSource::Auto,
+                        provenance: Provenance {
+                            tracker_version: tracker_version(),
+                            ..Provenance::default()
+                        },
+                        ..placed
+                    },
+                    false => placed,
+                };
+                Ok(segments::begin(document, point, placed))
             }
             Self::Mark { point, frame, occluded, uncertain, keyframe } => {
                 let stamp = checks.stamp(*frame)?;
@@ -135,12 +173,20 @@ impl Edit {
             Self::Delete { point, frame } => {
                 let stamp = checks.stamp(*frame)?;
                 observation(document, point, stamp, *frame)?;
-                Ok(document.cell(point, stamp, None).into_iter().collect())
+                Ok(segments::delete(document, point, |s| s == stamp))
             }
             Self::DeleteAfter { point, frame } => {
                 let stamp = checks.stamp(*frame)?;
-                let later = existing(document, point)?.keys().filter(|s| **s > stamp);
-                Ok(later.filter_map(|s| document.cell(point, *s, None)).collect())
+                existing(document, point)?;
+                Ok(segments::delete(document, point, |s| s > stamp))
+            }
+            Self::DeleteRange { point, frame, to } => {
+                let (first, last) = (checks.stamp(*frame)?, checks.stamp(*to)?);
+                if first > last {
+                    return Err(DataError::new(format!("frame {frame} is after frame {to}")));
+                }
+                existing(document, point)?;
+                Ok(segments::delete(document, point, |s| (first..=last).contains(&s)))
             }
             Self::RemovePoint { point } => {
                 let all = existing(document, point)?.keys();
@@ -171,7 +217,11 @@ impl Checks<'_> {
         })
     }
 
-    fn pixel(&self, u: f64, v: f64) -> DataResult<Pixel> {
+    /// A pixel of the image.
+    ///
+    /// # Errors
+    /// [`DataError`] if it lies outside.
+    pub(crate) fn pixel(&self, u: f64, v: f64) -> DataResult<Pixel> {
         let px = Pixel::new(u, v);
         if u.is_finite() && v.is_finite() && self.camera.contains(px) {
             return Ok(px);
@@ -179,6 +229,18 @@ impl Checks<'_> {
         let (width, height) = (self.camera.width(), self.camera.height());
         Err(DataError::new(format!("({u}, {v}) px lies outside the {width}x{height} image")))
     }
+}
+
+/// Whether a point would be a new one, which then has to have a name that can be and room.
+fn check_new(document: &Document, point: &str) -> DataResult<bool> {
+    let new = document.point(point).is_none();
+    if new {
+        check_name(point)?;
+        if document.points().len() >= MAX_POINTS {
+            return Err(DataError::new(format!("there are {MAX_POINTS} points already")));
+        }
+    }
+    Ok(new)
 }
 
 /// Refuses names that files, commands or people could not tell apart.

@@ -14,6 +14,7 @@ mod history;
 mod journal;
 mod open;
 mod save;
+mod segments;
 
 use std::path::{Path, PathBuf};
 

@@ -124,6 +124,33 @@ fn edits_are_checked_and_do_what_they_say() {
 }
 
 #[test]
+fn a_suggestion_taken_as_one_of_many_is_the_trackers_until_it_is_touched() {
+    let desk = Desk::new();
+    let mut store = desk.open("a.json").unwrap();
+    let spawn = |frame, suggested| Edit::Spawn { point: "1".into(), frame, u: 20.5, v: 30.25, suggested };
+    assert_eq!(desk.edit(&mut store, spawn(4, true)).unwrap().label, "begin 1 in frame 4");
+    let there = |store: &Store, frame: usize| *store.document().get("1", desk.frames[frame]).unwrap();
+    let taken = there(&store, 4);
+    assert!(taken.source == ObservationSource::Auto && taken.keyframe && !taken.uncertain);
+    assert_eq!(taken.provenance.tracker_version, vice_track::tracker_version());
+    assert_eq!(taken.provenance.confidence, None, "nothing was tracked to there");
+    // To say that it is right is to touch it.
+    desk.edit(&mut store, Edit::Place { point: "1".into(), frame: 4, u: 20.5, v: 30.25 }).unwrap();
+    let touched = there(&store, 4);
+    assert!(touched.source == ObservationSource::Manual && touched.keyframe);
+    desk.edit(&mut store, spawn(9, false)).unwrap();
+    assert!(there(&store, 9).source == ObservationSource::Manual && there(&store, 9).keyframe);
+    let refused =
+        desk.edit(&mut store, Edit::Spawn { point: "a,b".into(), frame: 0, u: 1.0, v: 1.0, suggested: true });
+    assert!(refused.unwrap_err().to_string().contains("name"));
+    let reversed = desk.edit(&mut store, Edit::DeleteRange { point: "1".into(), frame: 9, to: 4 });
+    assert!(reversed.unwrap_err().to_string().contains("after frame 4"));
+    let cut = desk.edit(&mut store, Edit::DeleteRange { point: "1".into(), frame: 5, to: 9 }).unwrap();
+    assert_eq!(cut.label, "delete 1 from frame 5 to 9");
+    assert_eq!(store.document().point("1").unwrap().len(), 1);
+}
+
+#[test]
 fn a_writer_must_know_what_others_did_except_the_tracker() {
     let desk = Desk::new();
     let mut store = desk.open("a.json").unwrap();
@@ -312,6 +339,10 @@ fn any_act() -> impl Strategy<Value = Act> {
             .prop_map(|(point, frame, u, v)| Act::Edit(Edit::Place { point, frame, u, v })),
         1 => (point(), frame()).prop_map(|(point, frame)| Act::Edit(Edit::Delete { point, frame })),
         1 => (point(), frame()).prop_map(|(point, frame)| Act::Edit(Edit::DeleteAfter { point, frame })),
+        2 => (point(), frame(), 0.0..99.0_f64, any::<bool>())
+            .prop_map(|(point, frame, u, suggested)| Act::Edit(Edit::Spawn { point, frame, u, v: 7.0, suggested })),
+        1 => (point(), frame(), frame())
+            .prop_map(|(point, frame, to)| Act::Edit(Edit::DeleteRange { point, frame, to })),
         1 => point().prop_map(|point| Act::Edit(Edit::RemovePoint { point })),
         1 => (point(), point()).prop_map(|(point, to)| Act::Edit(Edit::Rename { point, to })),
         3 => Just(Act::Undo),

@@ -19,7 +19,8 @@ use crate::terminal::{self, Outcome, Verbosity, usage};
     mut_arg("fps", |a| a.help("Label the frame nearest to each tick of this rate [default: every frame]")),
     after_help = "Examples:\n  \
     vice annotate V1_01_easy --labels floor.json --fps 10 --duration 30\n  \
-    vice annotate my_run --labels my.json --estimate openvins.txt --depth zmap --no-open\n\n\
+    vice annotate my_run --labels my.json --estimate openvins.txt --depth zmap --no-open\n  \
+    vice annotate V1_01_easy --labels floor.json --fps 10 --review 30\n\n\
     Labels are on the disk before the page says so; Ctrl-C ends the program. A CSV is not written over: its labels go\n\
     on in a JSON beside it. What was done is kept in FILE.json.journal, with all steps for undo.\n\
     In the page `?` shows the keys."
@@ -39,6 +40,10 @@ pub(crate) struct Args {
     depth: Option<String>,
     #[command(flatten)]
     depth_options: DepthArgs,
+    /// Review instead of label: this many observations, drawn evenly, are placed anew by someone who does not see where they were.
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "40", help_heading = "Labels",
+        value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    review: Option<u32>,
     #[command(flatten)]
     server: ServerArgs,
 }
@@ -77,7 +82,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         ..Request::default()
     };
     let desk = Desk::open(&request)?;
-    if let Some(reason) = desk.read_only() {
+    if let Some(reason) = desk.read_only().filter(|_| args.review.is_none()) {
         tracing::warn!(
             "{}: {reason}; the labels are shown, but cannot be changed",
             desk.labels_file().display()
@@ -90,8 +95,9 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
             args.server.bind
         );
     }
-    let options = ServerOptions { bind: args.server.bind, port: args.server.port, keys };
-    serve(desk, &options, |url| {
+    let review = args.review.map(|n| n as usize);
+    let options = ServerOptions { bind: args.server.bind, port: args.server.port, keys, review };
+    let summary = serve(desk, &options, |url| {
         // A closed standard output is no reason to end.
         let _ = terminal::print(&format!("{url}\n"));
         verbosity.note("Open this address in a browser on this machine; Ctrl-C ends.");
@@ -101,6 +107,9 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
             tracing::warn!("no browser could be opened ({error}): open the address above by hand");
         }
     })?;
+    if let Some(summary) = summary {
+        terminal::print(&format!("{}\n", summary.text()))?;
+    }
     Ok(Outcome::Done)
 }
 

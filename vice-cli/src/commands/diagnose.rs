@@ -81,7 +81,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
                 if let Some(path) = &args.json {
                     texts.push((path, to_json(&result)?));
                 }
-                printed.push(labels_line(&request) + &render(&result.diagnosis));
+                printed.push(labels_line(&request, result.tracking.as_ref()) + &render(&result.diagnosis));
                 match (&args.apply, calibration) {
                     (Some(path), Ok(file)) => {
                         file.write(path, Overwrite::Replace)?;

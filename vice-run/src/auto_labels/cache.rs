@@ -20,10 +20,11 @@ use crate::error::RunResult;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::text::hex;
+use crate::tracking_summary::TrackingSummary;
 
 /// The cache folder, in place of the user's.
 const CACHE: &str = "VICE_CACHE";
-const SCHEMA: &str = "vice.auto-labels/1";
+const SCHEMA: &str = "vice.auto-labels/2";
 /// Pictures that stand for all of them.
 const SAMPLED: usize = 5;
 
@@ -32,14 +33,14 @@ const SAMPLED: usize = 5;
 struct Kept {
     schema: String,
     labels: serde_json::Value,
-    summary: String,
+    summary: TrackingSummary,
     suspicions: Suspicions,
 }
 
 /// Labels, how they came about, and what should be known of them.
 pub(crate) struct Remembered {
     pub(crate) labels: LabelSet,
-    pub(crate) summary: String,
+    pub(crate) summary: TrackingSummary,
     pub(crate) suspicions: Suspicions,
 }
 

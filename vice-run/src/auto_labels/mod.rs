@@ -17,7 +17,7 @@ use vice_core::time::Span;
 use vice_files::atomic::Overwrite;
 use vice_files::labels;
 use vice_track::auto::{Auto, AutoOptions, AutoReport, Timeline, auto_labels};
-use vice_track::{DOUBT_CONFIDENCE, TRACKER_VERSION};
+use vice_track::{DOUBT_CONFIDENCE, tracker_version};
 
 use crate::error::{RunError, RunResult};
 use crate::progress::Progress;
@@ -26,7 +26,7 @@ use crate::request::{
 };
 use crate::scene::Scene;
 
-pub(crate) use cache::labels_of;
+pub(crate) use cache::{Remembered, labels_of};
 
 use given::Givens;
 use ground::{Film, Grounds};
@@ -251,11 +251,6 @@ fn names(from: Option<&Givens>, count: usize) -> Vec<String> {
     let given: Vec<String> = from.map(Givens::names).unwrap_or_default();
     let free = (1..).map(|n| format!("auto{n}")).filter(|name| !given.contains(name));
     given.iter().cloned().chain(free).take(count.max(given.len())).collect()
-}
-
-/// The number in the tracker's name and version.
-fn tracker_version() -> Option<u32> {
-    TRACKER_VERSION.rsplit_once('/')?.1.parse().ok()
 }
 
 /// What should be known before the labels are trusted.

@@ -7,6 +7,7 @@ use vice_core::diagnose::{DiagnosisDocument, VerdictKind};
 use super::table;
 use crate::request::{Request, labels_shown};
 use crate::text::printable;
+use crate::tracking_summary::TrackingSummary;
 
 /// The diagnosis as text.
 pub fn render(document: &DiagnosisDocument) -> String {
@@ -16,9 +17,10 @@ pub fn render(document: &DiagnosisDocument) -> String {
     text
 }
 
-/// Where the labels come from, where no person made them: a line ahead of a diagnosis.
-pub fn labels_line(request: &Request) -> String {
-    labels_shown(&request.labels.file).map_or_else(String::new, |labels| format!("labels: {labels}\n"))
+/// Where the labels come from, where no person made them, and how: lines ahead of a diagnosis.
+pub fn labels_line(request: &Request, tracking: Option<&TrackingSummary>) -> String {
+    let how = tracking.map(TrackingSummary::text).unwrap_or_default();
+    labels_shown(&request.labels.file).map_or_else(String::new, |labels| format!("labels: {labels}\n{how}"))
 }
 
 fn write_text(text: &mut String, document: &DiagnosisDocument) -> std::fmt::Result {

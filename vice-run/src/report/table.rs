@@ -127,8 +127,10 @@ fn not_available() -> String {
 
 fn heading(document: &ResultDocument) -> String {
     let d = &document.dataset;
-    let labels =
-        labels_shown(&document.request.labels.file).map_or_else(String::new, |l| format!("labels: {l}\n"));
+    let labels = labels_shown(&document.request.labels.file).map_or_else(String::new, |l| {
+        let tracking = document.used.tracking.as_ref().map_or_else(String::new, |t| t.text());
+        format!("labels: {l}\n{tracking}")
+    });
     format!(
         "{} ({}, {}): RMSE_2D in px, mean ± sd over subsets of the points; ref: the reference against the labels, est: the estimate against the labels\n{labels}\n",
         printable(&d.name),

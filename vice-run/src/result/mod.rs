@@ -16,6 +16,7 @@ pub use read::read;
 pub(crate) use read::read_bytes;
 
 use crate::request::Request;
+use crate::tracking_summary::TrackingSummary;
 
 /// The schema's name and version.
 pub const SCHEMA: &str = "vice.result/2";
@@ -66,6 +67,9 @@ pub struct Used {
     /// Noise of the labels that the intervals are without, pixels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub label_noise_px: Option<f64>,
+    /// How the labels came about, where no person made them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tracking: Option<TrackingSummary>,
 }
 
 impl ResultDocument {

@@ -58,6 +58,7 @@ impl From<Document> for ResultDocument {
             time_offset_s: old.settings.time_offset_s,
             align: old.settings.align.clone(),
             label_noise_px: None,
+            tracking: None,
         };
         Self {
             schema: SCHEMA.to_string(),

@@ -64,6 +64,10 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     let overwrite = Overwrite::from_force(args.force);
     let tracked = with_progress(verbosity, |progress| spec.run_to_file(&args.out, overwrite, progress))?;
     terminal::warn(tracked.suspicions.iter());
-    terminal::print(&format!("{}{}\n", tracked.summary(), printable(&args.out.display().to_string())))?;
+    terminal::print(&format!(
+        "{}{}\n",
+        tracked.summary().text(),
+        printable(&args.out.display().to_string())
+    ))?;
     Ok(Outcome::Done)
 }

@@ -93,6 +93,9 @@ fn section(run: &Run, place: usize, alone: bool) -> Markup {
                 }
             }
             p { (summary(document)) }
+            @if let Some(tracking) = &document.used.tracking {
+                @for line in tracking.text().lines() { p.soft { (line) } }
+            }
             (cards(document))
             h2 { "The table" }
             (tables::paper(document))
