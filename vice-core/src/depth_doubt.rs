@@ -35,6 +35,8 @@ const KEYFRAME_DEVIATIONS: f64 = 2.0;
 const BLUNDER: f64 = 3.0;
 /// How much better, in -2 ln of the likelihood, the other depth has to be: five deviations.
 const GAIN: f64 = 25.0;
+/// Below this share of it rounding does not matter.
+const SURE_SHARE: f64 = 0.999;
 /// How far off, on the logarithm.
 const LEAST_OFF_LOG: f64 = 0.1;
 /// How many times the smaller third of the others' depths are off.
@@ -110,6 +112,12 @@ pub trait LiftedTracks: Sync {
 
     /// One of them.
     fn get(&self, track: usize) -> LiftedTrack;
+
+    /// A sum of squared errors with the depth that was used that holds those of all its views, px²; `None` where it is not
+    /// known.
+    fn squares_px2(&self, _track: usize) -> Option<f64> {
+        None
+    }
 }
 
 impl LiftedTracks for [LiftedTrack] {
@@ -157,8 +165,13 @@ pub fn doubts(camera: &Camera, tracks: &(impl LiftedTracks + ?Sized)) -> Doubts 
         return Doubts::default();
     };
     let noise_px = (left / MEDIAN_LENGTH).max(LEAST_NOISE_PX);
+    // What a track costs is at most its squares over the noise: the shift of its key frame's label only makes it less.
+    let fits_as_it_is = |i: usize| {
+        tracks.squares_px2(i).is_some_and(|squares| squares < SURE_SHARE * GAIN * noise_px * noise_px)
+    };
     let fits: Vec<(usize, Fit)> = useful
         .par_iter()
+        .filter(|i| **i % step == 0 || !fits_as_it_is(**i))
         .filter_map(|i| {
             let fitter = Fitter { camera, track: &tracks.get(*i), noise_px };
             // What fits as it is needs no other depth; the sample is fitted for what its depths differ by.
