@@ -29,7 +29,10 @@ impl CameraNumbers {
 }
 
 /// Where each point is seen minus where its label is, pixels; NaN where it is not seen, or where nothing is known of it.
-pub(super) fn residuals_px(camera: &Camera, labels: impl ExactSizeIterator<Item = Option<Asked>>) -> Vec<Residual> {
+pub(super) fn residuals_px(
+    camera: &Camera,
+    labels: impl ExactSizeIterator<Item = Option<Asked>>,
+) -> Vec<Residual> {
     let mut all = Vec::with_capacity(labels.len());
     with_lens!(camera, bound => fill(bound, labels, &mut all));
     all

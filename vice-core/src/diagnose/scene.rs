@@ -230,8 +230,8 @@ impl<'a> Scene<'a> {
             if turns || unscaled == *theta {
                 return self.frames.iter().map(|f| reader.at(f.t_s)).collect();
             }
-            let read =
-                self.kept_or(key(&unscaled), || self.frames.iter().map(|f| reader.unscaled_at(f.t_s)).collect());
+            let read = self
+                .kept_or(key(&unscaled), || self.frames.iter().map(|f| reader.unscaled_at(f.t_s)).collect());
             let frames = self.frames.iter().zip(&*read);
             frames.map(|(f, pose)| reader.from_unscaled(*pose, f.t_s)).collect()
         })
