@@ -35,6 +35,8 @@ const KEYFRAME_DEVIATIONS: f64 = 2.0;
 const BLUNDER: f64 = 3.0;
 /// How much better, in -2 ln of the likelihood, the other depth has to be: five deviations.
 const GAIN: f64 = 25.0;
+/// Below this share of it rounding does not matter.
+const SURE_SHARE: f64 = 0.999;
 /// How far off, on the logarithm.
 const LEAST_OFF_LOG: f64 = 0.1;
 /// How many times the smaller third of the others' depths are off.
@@ -110,6 +112,12 @@ pub trait LiftedTracks: Sync {
 
     /// One of them.
     fn get(&self, track: usize) -> LiftedTrack;
+
+    /// A sum of squared errors with the depth that was used that holds those of all its views, px²; `None` where it is not
+    /// known.
+    fn squares_px2(&self, _track: usize) -> Option<f64> {
+        None
+    }
 }
 
 impl LiftedTracks for [LiftedTrack] {
@@ -157,8 +165,13 @@ pub fn doubts(camera: &Camera, tracks: &(impl LiftedTracks + ?Sized)) -> Doubts 
         return Doubts::default();
     };
     let noise_px = (left / MEDIAN_LENGTH).max(LEAST_NOISE_PX);
+    // What a track costs is at most its squares over the noise: the shift of its key frame's label only makes it less.
+    let fits_as_it_is = |i: usize| {
+        tracks.squares_px2(i).is_some_and(|squares| squares < SURE_SHARE * GAIN * noise_px * noise_px)
+    };
     let fits: Vec<(usize, Fit)> = useful
         .par_iter()
+        .filter(|i| **i % step == 0 || !fits_as_it_is(**i))
         .filter_map(|i| {
             let fitter = Fitter { camera, track: &tracks.get(*i), noise_px };
             // What fits as it is needs no other depth; the sample is fitted for what its depths differ by.
@@ -293,82 +306,4 @@ fn length(v: [f64; 2]) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::camera::Model;
-    use crate::frames::Rigid;
-    use crate::random::SplitMix;
-    use nalgebra::UnitQuaternion;
-
-    fn camera() -> Camera {
-        let model =
-            Model::from_name("radtan", &[-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]).unwrap();
-        Camera::new(752, 480, [458.654, 457.296, 367.215, 248.375], model).unwrap()
-    }
-
-    /// A camera that goes aside and turns a little; the depth that is used is `used` times the true one, the motion
-    /// `scale` times as long as the true one.
-    fn track(random: &mut SplitMix, used: f64, scale: f64) -> LiftedTrack {
-        let mut unit = || random.below(1 << 20) as f64 / f64::from(1 << 20);
-        let truth = Point3::new(2.0 * unit() - 1.0, unit() - 0.5, 2.0 + 2.0 * unit());
-        let speed = Vector3::new(0.15 + 0.1 * unit(), 0.1 * unit() - 0.05, 0.1 * unit());
-        let mut noise = || (unit() + unit() + unit() - 1.5) * 1.4;
-        let view = |i: usize| {
-            let t = 0.1 * i as f64;
-            let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.01 * t, 0.03 * t, 0.0));
-            let now: WorldFromCamera = Rigid::from_parts(-t * speed, turn).inverse();
-            let told: WorldFromCamera = Rigid::from_parts(-t * scale * speed, turn).inverse();
-            let seen = camera().project(&now.inverse().transform_point(&truth)).unwrap();
-            (told, Pixel::new(seen.u + noise(), seen.v + noise()))
-        };
-        let views: Vec<_> = (1..=40).map(view).collect();
-        LiftedTrack::new(truth * used, Rigid::identity(), &views)
-    }
-
-    #[test]
-    fn wrong_depths_are_found_and_right_ones_left_alone() {
-        let mut random = SplitMix::new(7);
-        for seed in 0..10 {
-            let tracks: Vec<LiftedTrack> = (0..20)
-                .map(|i| track(&mut random, if i % 2 == 0 { 1.0 } else { 1.3 + 0.1 * f64::from(i) }, 1.0))
-                .collect();
-            let found = doubts(&camera(), &tracks[..]);
-            assert_eq!(found.points.iter().map(|p| p.0 % 2).collect::<Vec<_>>(), [1; 10], "seed {seed}");
-            for (i, better) in &found.points {
-                let expected = 1.0 / (1.3 + 0.1 * *i as f64);
-                assert!((better.factor / expected - 1.0).abs() < 0.1, "{better:?} for {expected}");
-                assert!(better.error_then_px < 2.0 && better.error_px > better.error_then_px);
-            }
-            assert_eq!(found.common, None);
-        }
-    }
-
-    #[test]
-    fn a_scale_of_the_motion_is_not_blamed_on_the_points() {
-        let mut random = SplitMix::new(3);
-        let tracks: Vec<LiftedTrack> = (0..12).map(|_| track(&mut random, 1.0, 1.5)).collect();
-        let found = doubts(&camera(), &tracks[..]);
-        assert!(found.points.is_empty(), "{found:?}");
-        let (factor, n, of) = found.common.unwrap();
-        assert!((factor / 1.5 - 1.0).abs() < 0.05 && n >= 10 && of == 12, "{factor} {n} {of}");
-    }
-
-    #[test]
-    fn nothing_is_doubted_where_nothing_can_be_seen() {
-        let mut random = SplitMix::new(5);
-        let mut tracks: Vec<LiftedTrack> =
-            (0..8).map(|i| track(&mut random, 1.0 + f64::from(i), 0.0)).collect();
-        // The camera stands, and so do the labels.
-        let standing = |track: &LiftedTrack, views: usize| {
-            let seen = Pixel::new(track.label_px[0][0], track.label_px[1][0]);
-            let ray = camera().unproject(seen).unwrap();
-            let point = Point3::from(ray * track.point_camera_m.z);
-            LiftedTrack::new(point, Rigid::identity(), &vec![(Rigid::identity(), seen); views])
-        };
-        tracks.iter_mut().for_each(|track| *track = standing(track, 40));
-        assert_eq!(doubts(&camera(), &tracks[..]), Doubts::default());
-        assert_eq!(doubts(&camera(), &[][..]), Doubts::default());
-        tracks.iter_mut().for_each(|track| *track = standing(track, 2));
-        assert_eq!(doubts(&camera(), &tracks[..]), Doubts::default());
-    }
-}
+mod tests;

@@ -6,6 +6,7 @@
 
 use std::cmp::Ordering;
 
+use crate::parallel::*;
 use crate::random::SplitMix;
 
 /// A number with the middle 95 % of its resampled values.
@@ -88,46 +89,80 @@ impl Leading for f64 {
 /// How many leading bits tell apart.
 const LEADING: usize = 1 << 16;
 
-/// The values at some ranks, ascending from 0, of the numbers in several slices that are wanted: in two passes and without a
-/// copy of them all. Numbers must not be negative; ranks ascend and are below their number.
-pub(crate) fn at_ranks<T: Leading>(parts: &[&[T]], wanted: impl Fn(&T) -> bool, ranks: &[u64]) -> Vec<f64> {
-    let mut counts = vec![0_u64; LEADING];
-    let all = || parts.iter().flat_map(|part| part.iter()).filter(|v| wanted(v));
-    for part in parts {
-        part.iter().filter(|v| wanted(v)).for_each(|v| counts[v.leading()] += 1);
-    }
-    let mut found = Vec::new();
-    // The numbers that share their leading bits, which were gathered last.
-    let (mut of, mut alike): (usize, Vec<f64>) = (LEADING, Vec::new());
-    for rank in ranks {
-        let (mut bucket, mut before) = (0, 0);
-        while bucket + 1 < LEADING && before + counts[bucket] <= *rank {
-            before += counts[bucket];
-            bucket += 1;
-        }
-        if bucket != of {
-            of = bucket;
-            alike = all().filter(|v| v.leading() == bucket).map(|v| (*v).into()).collect();
-        }
-        let at = usize::try_from(rank - before).unwrap_or(usize::MAX);
-        if at < alike.len() {
-            found.push(*alike.select_nth_unstable_by(at, f64::total_cmp).1);
-        }
-    }
-    found
+/// Numbers in several slices, none of which is negative, counted by their leading bits: ranks are found in one more pass and
+/// without a copy of them all.
+pub(crate) struct Counted<'a, T, W> {
+    parts: &'a [&'a [T]],
+    wanted: W,
+    counts: Vec<u64>,
+    /// How many are wanted.
+    pub(crate) total: u64,
 }
 
-/// [`median`] of the numbers in several slices that are wanted, none of which may be negative.
-pub(crate) fn median_in_parts<T: Leading>(parts: &[&[T]], wanted: impl Fn(&T) -> bool) -> Option<f64> {
-    let count = parts.iter().map(|part| part.iter().filter(|v| wanted(v)).count() as u64).sum::<u64>();
-    let middle = count / 2;
-    match (count, count.is_multiple_of(2)) {
-        (0, _) => None,
-        (_, false) => at_ranks(parts, wanted, &[middle]).first().copied(),
-        (_, true) => match at_ranks(parts, wanted, &[middle - 1, middle])[..] {
-            [lower, upper] => Some(f64::midpoint(lower, upper)),
-            _ => None,
-        },
+impl<'a, T: Leading + Sync, W: Fn(&T) -> bool + Sync> Counted<'a, T, W> {
+    /// Counts those that are wanted.
+    pub(crate) fn new(parts: &'a [&'a [T]], wanted: W) -> Self {
+        let some = parts.len().div_ceil(current_num_threads()).max(1);
+        let chunks: Vec<&[&[T]]> = parts.chunks(some).collect();
+        let of_chunk = |chunk: &&[&[T]]| {
+            let mut counts = vec![0_u64; LEADING];
+            for value in chunk.iter().flat_map(|part| part.iter()).filter(|v| wanted(v)) {
+                counts[value.leading()] += 1;
+            }
+            counts
+        };
+        let all: Vec<Vec<u64>> = chunks.par_iter().map(of_chunk).collect();
+        let mut counts = vec![0_u64; LEADING];
+        for of_chunk in all {
+            counts.iter_mut().zip(of_chunk).for_each(|(sum, count)| *sum += count);
+        }
+        let total = counts.iter().sum();
+        Self { parts, wanted, counts, total }
+    }
+
+    /// The values at some ranks, ascending from 0; ranks ascend and are below the number of values.
+    pub(crate) fn at_ranks(&self, ranks: &[u64]) -> Vec<f64> {
+        let mut found = Vec::new();
+        // The numbers that share their leading bits, which were gathered last.
+        let (mut of, mut alike): (usize, Vec<f64>) = (LEADING, Vec::new());
+        for rank in ranks {
+            let (mut bucket, mut before) = (0, 0);
+            while bucket + 1 < LEADING && before + self.counts[bucket] <= *rank {
+                before += self.counts[bucket];
+                bucket += 1;
+            }
+            if bucket != of {
+                of = bucket;
+                alike = self.with_leading(bucket);
+            }
+            let at = usize::try_from(rank - before).unwrap_or(usize::MAX);
+            if at < alike.len() {
+                found.push(*alike.select_nth_unstable_by(at, f64::total_cmp).1);
+            }
+        }
+        found
+    }
+
+    fn with_leading(&self, bucket: usize) -> Vec<f64> {
+        let of_part = |part: &&[T]| -> Vec<f64> {
+            let alike = part.iter().filter(|v| v.leading() == bucket && (self.wanted)(v));
+            alike.map(|v| (*v).into()).collect()
+        };
+        let all: Vec<Vec<f64>> = self.parts.par_iter().map(of_part).collect();
+        all.concat()
+    }
+
+    /// Their [`median`].
+    pub(crate) fn median(&self) -> Option<f64> {
+        let middle = self.total / 2;
+        match (self.total, self.total.is_multiple_of(2)) {
+            (0, _) => None,
+            (_, false) => self.at_ranks(&[middle]).first().copied(),
+            (_, true) => match self.at_ranks(&[middle - 1, middle])[..] {
+                [lower, upper] => Some(f64::midpoint(lower, upper)),
+                _ => None,
+            },
+        }
     }
 }
 
@@ -185,15 +220,16 @@ mod tests {
         fn in_parts_it_is_the_same(values in prop::collection::vec(prop::sample::select(vec![0.0, 1e-300, 0.5, 0.50001, 1.0, 7.25, 1e9]), 0..40), cut in 0_usize..40) {
             let cut = cut.min(values.len());
             let parts = [&values[..cut], &values[cut..]];
-            prop_assert_eq!(median_in_parts(&parts, |_| true), median(&mut values.clone()));
+            prop_assert_eq!(Counted::new(&parts, |_| true).median(), median(&mut values.clone()));
             let above: Vec<f64> = values.iter().copied().filter(|v| *v > 0.0).collect();
-            prop_assert_eq!(median_in_parts(&parts, |v| *v > 0.0), median(&mut above.clone()));
+            let counted = Counted::new(&parts, |v| *v > 0.0);
+            prop_assert_eq!((counted.total, counted.median()), (above.len() as u64, median(&mut above.clone())));
             let sorted = sorted(values.clone());
             let ranks: Vec<u64> = (0..values.len() as u64).collect();
-            prop_assert_eq!(at_ranks(&parts, |_| true, &ranks), sorted);
+            prop_assert_eq!(Counted::new(&parts, |_| true).at_ranks(&ranks), sorted);
             let floats: Vec<f32> = values.iter().map(|v| *v as f32).collect();
             let mut wide: Vec<f64> = floats.iter().map(|v| f64::from(*v)).collect();
-            prop_assert_eq!(median_in_parts(&[&floats], |_| true), median(&mut wide));
+            prop_assert_eq!(Counted::new(&[&floats[..]], |_| true).median(), median(&mut wide));
         }
     }
 }

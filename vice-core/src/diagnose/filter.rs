@@ -8,6 +8,7 @@
 #![expect(clippy::needless_range_loop, reason = "indices of matrices are clearer as indices")]
 #![expect(clippy::manual_memcpy, reason = "a copy of a slice is a call, and takes registers through memory")]
 
+mod means;
 mod state;
 mod update;
 
@@ -157,6 +158,10 @@ struct Pass<'p> {
     following: Vec<Following>,
     /// Columns of shifts that are no longer followed.
     spare: Vec<usize>,
+    /// Columns that were ever taken.
+    used: usize,
+    /// What is measured of a frame, row by row in all columns.
+    measured: Vec<f64>,
     lean: f64,
     out: Whitened,
 }
@@ -203,6 +208,8 @@ impl<'p> Pass<'p> {
             slots: vec![usize::MAX; geometry.segments.len()],
             following: Vec::new(),
             spare: Vec::new(),
+            used: width,
+            measured: Vec::new(),
             lean,
             out,
         }
@@ -293,36 +300,40 @@ impl<'p> Pass<'p> {
         }
         let log_variances = self.update.covariance(simd, &mut self.state, rows, looked_at);
         let (width, m) = (self.out.width, rows.len());
-        let mut measured = [0.0; 2 * AT_ONCE];
-        let first = self.out.rows.len();
-        self.out.rows.resize(first + m * width, 0.0);
+        let all = self.state.means.width();
+        self.measured.clear();
+        self.measured.resize(m * all, 0.0);
         for (c, column) in self.columns.iter().enumerate() {
             for (i, l) in labels.iter().enumerate() {
-                (measured[2 * i], measured[2 * i + 1]) = (column[*l].x, column[*l].y);
-            }
-            self.update.mean(&mut self.state.means[c], rows, &mut measured[..m]);
-            for (i, value) in measured[..m].iter().enumerate() {
-                self.out.rows[first + i * width + c] = *value;
+                let value = &column[*l];
+                self.measured[2 * i * all + c] = value.x;
+                self.measured[(2 * i + 1) * all + c] = value.y;
             }
         }
-        for one in &self.following {
-            let mut own = [[0.0; 2 * AT_ONCE]; 2];
-            for (axis, own) in own.iter_mut().enumerate() {
-                if self.shifts == Shifts::Labels
-                    && let Some(i) = labels.iter().position(|l| *l == one.of)
-                {
-                    own[2 * i + axis] = 1.0;
+        if self.shifts == Shifts::Labels {
+            for one in &self.following {
+                if let Some(i) = labels.iter().position(|l| *l == one.of) {
+                    self.measured[2 * i * all + one.columns[0]] = 1.0;
+                    self.measured[(2 * i + 1) * all + one.columns[1]] = 1.0;
                 }
-                self.update.mean(&mut self.state.means[one.columns[axis]], rows, &mut own[..m]);
             }
+        }
+        self.update.mean(simd, &mut self.state, rows, &mut self.measured);
+        for row in self.measured.chunks_exact(all) {
+            self.out.rows.extend_from_slice(&row[..width]);
+        }
+        for one in &self.following {
             let shift = &mut self.out.shifts[one.of];
-            for i in 0..m {
-                let whitened = &self.out.rows[first + i * width..first + (i + 1) * width];
+            for row in self.measured.chunks_exact(all) {
+                let own = [row[one.columns[0]], row[one.columns[1]]];
                 for a in 0..2 {
                     for b in 0..2 {
-                        shift.own[a][b] += own[a][i] * own[b][i];
+                        shift.own[a][b] += own[a] * own[b];
                     }
-                    shift.with[a].iter_mut().zip(whitened).for_each(|(sum, w)| *sum += own[a][i] * w);
+                    let with = &mut shift.with[a][..width];
+                    for c in 0..width {
+                        with[c] += own[a] * row[c];
+                    }
                 }
             }
         }
@@ -342,7 +353,7 @@ impl<'p> Pass<'p> {
             let goes_on = one.until > f;
             if !goes_on {
                 spare.extend(one.columns);
-                one.columns.iter().for_each(|c| state.means[*c].fill(0.0));
+                one.columns.iter().for_each(|c| state.means.clear_column(*c));
             }
             goes_on
         });
@@ -357,7 +368,7 @@ impl<'p> Pass<'p> {
                 for (a, c) in columns.into_iter().enumerate() {
                     // The filter predicts the shift's effect from here on: a residual of the opposite sign.
                     for i in 0..3 {
-                        self.state.means[c][slot + i] = -segment.by_pixel[(i, a)];
+                        self.state.means.set(slot + i, c, -segment.by_pixel[(i, a)]);
                     }
                 }
                 self.following.push(Following { of: *s, columns, until: segment.last_frame + AFTER });
@@ -367,10 +378,13 @@ impl<'p> Pass<'p> {
 
     /// A column of zeros.
     fn another(&mut self) -> usize {
-        let means = &mut self.state.means;
         self.spare.pop().unwrap_or_else(|| {
-            means.push(vec![0.0; self.state.stride]);
-            means.len() - 1
+            let column = self.used;
+            self.used += 1;
+            if self.used > self.state.means.width() {
+                self.state.means.widen();
+            }
+            column
         })
     }
 }

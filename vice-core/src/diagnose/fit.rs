@@ -21,7 +21,7 @@ const EXCESS: f64 = 3.8;
 const USUAL_FRAMES: f64 = 300.0;
 
 /// Fits whose passes are shared at a time: enough to save most of them, few enough for all threads and the memory.
-pub(super) const TOGETHER: usize = 6;
+pub(super) const TOGETHER: usize = 8;
 
 /// What hypotheses are fitted to.
 pub(super) struct Work<'s, 'a> {
@@ -105,7 +105,7 @@ impl<'s, 'a> Work<'s, 'a> {
     ) -> Result<Self, DiagnoseError> {
         let view = scene.view(theta, motion)?;
         let geometry = Geometry::new(scene, &view, noise.inertial);
-        let dead: Vec<bool> = scene.labels.iter().map(|l| view.residual(l).is_none()).collect();
+        let dead: Vec<bool> = view.residuals().iter().map(|r| r.x.is_nan()).collect();
         let keys = vec![1.0; scene.segments.len()];
         let weights = Weights { labels: vec![1.0; scene.labels.len()], keys };
         let mut work = Self { scene, motion, geometry, noise, weights, dead };
@@ -129,12 +129,14 @@ impl<'s, 'a> Work<'s, 'a> {
 impl Work<'_, '_> {
     pub(super) fn residuals(&self, theta: &Theta) -> Result<Vec<Residual>, DiagnoseError> {
         let lost = Residual::new(LOST_PX, LOST_PX);
-        Ok(self
-            .scene
-            .residuals(theta, self.motion)?
-            .into_iter()
-            .map(|r| r.map_or(lost, |r| if r.norm() < LOST_PX { r } else { r * (LOST_PX / r.norm()) }))
-            .collect())
+        let mut residuals = self.scene.residuals(theta, self.motion)?;
+        for r in &mut residuals {
+            if r.norm() < LOST_PX {
+                continue;
+            }
+            *r = if r.x.is_nan() { lost } else { *r * (LOST_PX / r.norm()) };
+        }
+        Ok(residuals)
     }
 
     pub(super) fn whiten(

@@ -78,10 +78,8 @@ pub(super) fn hypotheses(
             };
             let residuals = scene.residuals(&Theta::zero(), &motion).ok()?;
             let lost = Residual::new(1000.0, 0.0);
-            let residuals: Vec<Residual> = residuals
-                .into_iter()
-                .map(|r| r.map_or(lost, |r| if r.norm() < LOST_PX { r } else { lost }))
-                .collect();
+            let residuals: Vec<Residual> =
+                residuals.into_iter().map(|r| if r.norm() < LOST_PX { r } else { lost }).collect();
             let cost = robust_cost(&residuals);
             let unlikely = cost * independent(residuals.len()) + unusual(scene, &trajectory);
             Some(Hypothesis { conventions, trajectory, motion: motion.poses, cost, unlikely })

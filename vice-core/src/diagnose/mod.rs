@@ -13,6 +13,7 @@
 //! No ground truth is needed: the labels are the truth. Where the estimate itself places the camera for depth, its
 //! flaws move the depth as well, and that is fitted too.
 
+mod carry;
 mod document;
 mod filter;
 mod fit;

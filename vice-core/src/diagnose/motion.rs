@@ -85,9 +85,14 @@ impl Poses {
 
     /// The pose at a time; beyond the ends the last step goes on.
     pub(super) fn at(&self, t_s: f64) -> WorldFromBody {
+        self.between(t_s, |index| self.poses[index])
+    }
+
+    /// The same of other poses at the same times.
+    fn between(&self, t_s: f64, pose: impl Fn(usize) -> WorldFromBody) -> WorldFromBody {
         let n = self.times_s.len();
         if n == 1 {
-            return self.poses[0];
+            return pose(0);
         }
         let guess = ((t_s - self.times_s[0]) * self.rate_hz).clamp(0.0, (n - 2) as f64) as usize;
         let fits = |i: usize| self.times_s[i] <= t_s && t_s <= self.times_s[i + 1];
@@ -97,7 +102,7 @@ impl Poses {
             self.times_s.partition_point(|t| *t <= t_s).saturating_sub(1).min(n - 2)
         };
         let (t0, t1) = (self.times_s[before], self.times_s[before + 1]);
-        interpolate(&self.poses[before], &self.poses[before + 1], (t_s - t0) / (t1 - t0))
+        interpolate(&pose(before), &pose(before + 1), (t_s - t0) / (t1 - t0))
     }
 
     /// Local quadratics through the poses, at even spacing; as it is where poses are sparse.
@@ -163,26 +168,28 @@ impl Poses {
         Some(Rigid::from_parts(p, base.rotation() * turn))
     }
 
-    /// Without a yaw rate and a velocity in a world that turns with it, and shorter by a scale: dead reckoning again,
-    /// step by step.
-    fn without_yaw(&self, longer: f64, velocity: Vector3<f64>, yaw_rate: f64) -> Self {
+    /// Positions without a yaw rate and a velocity in a world that turns with it, and shorter by a scale: dead reckoning
+    /// again, step by step.
+    fn without_yaw(&self, longer: f64, velocity: Vector3<f64>, yaw_rate: f64) -> Vec<Vector3<f64>> {
         let start = self.times_s[0];
         let first = self.poses[0].translation();
         let (mut before_s, mut before, mut position) = (0.0, first, first);
-        let turn = |angle: f64| {
-            let (sin, cos) = (0.5 * angle).sin_cos();
-            UnitQuaternion::new_unchecked(Quaternion::new(cos, 0.0, 0.0, sin))
-        };
-        let poses = self.times_s.iter().zip(&self.poses).map(|(t, pose)| {
+        let positions = self.times_s.iter().zip(&self.poses).map(|(t, pose)| {
             let now_s = t - start;
             let step = (pose.translation() - before) / longer - velocity * (now_s - before_s);
             let (sin, cos) = (-0.5 * yaw_rate * (before_s + now_s)).sin_cos();
             position += Vector3::new(cos * step.x - sin * step.y, sin * step.x + cos * step.y, step.z);
             (before_s, before) = (now_s, pose.translation());
-            Rigid::from_parts(position, turn(-yaw_rate * now_s) * pose.rotation())
+            position
         });
-        let poses = poses.collect();
-        Self { times_s: self.times_s.clone(), poses, rate_hz: self.rate_hz }
+        positions.collect()
+    }
+
+    /// One of the poses with a position of [`Poses::without_yaw`].
+    fn turned_back(&self, index: usize, position: Vector3<f64>, yaw_rate: f64) -> WorldFromBody {
+        let (sin, cos) = (0.5 * (-yaw_rate * (self.times_s[index] - self.times_s[0]))).sin_cos();
+        let turn = UnitQuaternion::new_unchecked(Quaternion::new(cos, 0.0, 0.0, sin));
+        Rigid::from_parts(position, turn * self.poses[index].rotation())
     }
 
     pub(super) fn first_s(&self) -> f64 {
@@ -206,7 +213,7 @@ impl Motion<'_> {
         let offset_s = theta.of(Flaw::ClockOffset)[0];
         let tilt = theta.of(Flaw::InitialTilt);
         let mut late_s = offset_s;
-        let mut poses = match self.inertial {
+        let poses = match self.inertial {
             Some(run) if offset_s != 0.0 || tilt != [0.0, 0.0] => {
                 late_s = 0.0;
                 let too_late = Span::from_secs_f64(offset_s)
@@ -219,20 +226,24 @@ impl Motion<'_> {
         let mut longer = 1.0 + theta.of(Flaw::Scale)[0];
         let drift = theta.of(Flaw::Drift);
         let (mut velocity, yaw_rate) = (Vector3::new(drift[0], drift[1], drift[2]), drift[3]);
+        let mut turned = None;
         if yaw_rate != 0.0 {
-            poses = Cow::Owned(poses.without_yaw(longer, velocity, yaw_rate));
+            turned = Some((poses.without_yaw(longer, velocity, yaw_rate), yaw_rate));
             (longer, velocity) = (1.0, Vector3::zeros());
         }
         let first = poses.poses[0].translation();
         let [step_s, step_at_s] = [theta.of(Flaw::ClockStep)[0], theta.of(Flaw::ClockStep)[1]];
         let fast = theta.of(Flaw::ClockRate)[0];
-        Ok(Reader { poses, late_s, fast, step_s, step_at_s, longer, velocity, first })
+        Ok(Reader { poses, turned, late_s, fast, step_s, step_at_s, longer, velocity, first })
     }
 }
 
 /// Reads poses at true times.
 pub(super) struct Reader<'a> {
     poses: Cow<'a, Poses>,
+    /// Positions at the times of the poses and the rate at which their rotations are turned back, where the estimate turns
+    /// away at a rate: poses are made where they are read.
+    turned: Option<(Vec<Vector3<f64>>, f64)>,
     late_s: f64,
     fast: f64,
     step_s: f64,
@@ -244,13 +255,32 @@ pub(super) struct Reader<'a> {
 
 impl Reader<'_> {
     pub(super) fn at(&self, t_s: f64) -> WorldFromBody {
+        self.from_unscaled(self.unscaled_at(t_s), t_s)
+    }
+
+    /// The same with its scale and velocity.
+    pub(super) fn unscaled_at(&self, t_s: f64) -> WorldFromBody {
+        let read_s = self.read_s(t_s);
+        match &self.turned {
+            None => self.poses.at(read_s),
+            Some((positions_m, yaw_rate)) => {
+                self.poses.between(read_s, |i| self.poses.turned_back(i, positions_m[i], *yaw_rate))
+            }
+        }
+    }
+
+    /// When the stream is read for a true time.
+    fn read_s(&self, t_s: f64) -> f64 {
         let step = if t_s >= self.step_at_s { self.step_s } else { 0.0 };
-        let read_s = t_s * (1.0 + self.fast) + self.late_s + step;
-        let pose = self.poses.at(read_s);
+        t_s * (1.0 + self.fast) + self.late_s + step
+    }
+
+    /// The pose at a true time without scale and velocity, from that with them.
+    pub(super) fn from_unscaled(&self, pose: WorldFromBody, t_s: f64) -> WorldFromBody {
         if self.longer == 1.0 && self.velocity == Vector3::zeros() {
             return pose;
         }
-        let since_s = read_s - self.poses.first_s();
+        let since_s = self.read_s(t_s) - self.poses.first_s();
         let position = self.first + (pose.translation() - self.first) / self.longer - self.velocity * since_s;
         Rigid::from_parts(position, pose.rotation())
     }

@@ -151,7 +151,7 @@ impl Reporter<'_, '_, '_> {
     pub(super) fn left_px(&self, fit: &Fit) -> f64 {
         let residuals = self.prepared.scene.residuals(&fit.values(), &self.prepared.plain);
         let Ok(residuals) = residuals else { return self.work.rms(&fit.residuals_now()) };
-        let scored: Vec<f64> = residuals.iter().flatten().map(|r| r.norm_squared()).collect();
+        let scored: Vec<f64> = residuals.iter().filter(|r| !r.x.is_nan()).map(|r| r.norm_squared()).collect();
         (scored.iter().sum::<f64>() / scored.len().max(1) as f64).sqrt()
     }
 

@@ -35,7 +35,7 @@ type Poses = Arc<Vec<WorldFromBody>>;
 const KEPT_DEPTHS: usize = 96;
 
 /// Poses at the frames that are kept.
-const KEPT_POSES: usize = 6;
+const KEPT_POSES: usize = 8;
 
 /// A frame with a key frame or a label.
 #[derive(Clone, Debug)]
@@ -216,15 +216,34 @@ impl<'a> Scene<'a> {
 
     /// Poses at the frames.
     pub(super) fn poses(&self, theta: &Theta, reader: &Reader<'_>, motion: &Motion<'_>) -> Poses {
-        let mut key = vec![motion.id];
-        for flaw in Flaw::ALL.iter().filter(|f| f.of_the_motion()) {
-            key.extend(theta.of(*flaw).iter().map(|v| (v + 0.0).to_bits()));
-        }
+        let key = |theta: &Theta| {
+            let mut key = vec![motion.id];
+            for flaw in Flaw::ALL.iter().filter(|f| f.of_the_motion()) {
+                key.extend(theta.of(*flaw).iter().map(|v| (v + 0.0).to_bits()));
+            }
+            key
+        };
+        self.kept_or(key(theta), || {
+            // A scale and a velocity move what is read: reading is what takes time.
+            let unscaled = theta.with(Flaw::Scale, &[0.0]).with(Flaw::Drift, &[0.0; 4]);
+            let turns = theta.of(Flaw::Drift)[3] != 0.0;
+            if turns || unscaled == *theta {
+                return self.frames.iter().map(|f| reader.at(f.t_s)).collect();
+            }
+            let read = self
+                .kept_or(key(&unscaled), || self.frames.iter().map(|f| reader.unscaled_at(f.t_s)).collect());
+            let frames = self.frames.iter().zip(&*read);
+            frames.map(|(f, pose)| reader.from_unscaled(*pose, f.t_s)).collect()
+        })
+    }
+
+    /// Poses that are kept under a key, or those that are made, which are kept then.
+    fn kept_or(&self, key: Vec<u64>, make: impl FnOnce() -> Vec<WorldFromBody>) -> Poses {
         let kept = || self.kept_poses.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, poses)) = kept().iter().find(|(k, _)| *k == key) {
             return Arc::clone(poses);
         }
-        let poses: Poses = Arc::new(self.frames.iter().map(|f| reader.at(f.t_s)).collect());
+        let poses: Poses = Arc::new(make());
         let mut kept = kept();
         if kept.len() >= KEPT_POSES {
             kept.remove(0);
@@ -342,9 +361,9 @@ impl<'a> Scene<'a> {
                 self.residuals(&moved, motion)
             };
             let (above, below) = (at(1.0)?, at(-1.0)?);
-            let difference = |(a, b): (&Option<Residual>, &Option<Residual>)| match (a, b) {
-                (Some(a), Some(b)) => (a - b) / (2.0 * step),
-                _ => Residual::zeros(),
+            let difference = |(a, b): (&Residual, &Residual)| {
+                let slope = (a - b) / (2.0 * step);
+                if slope.x.is_nan() { Residual::zeros() } else { slope }
             };
             Ok(above.iter().zip(&below).map(difference).collect())
         };

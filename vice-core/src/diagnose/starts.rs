@@ -9,9 +9,24 @@ use super::theta::Theta;
 /// Errors beyond this count less and less, pixels.
 const ROBUST_PX: f64 = 3.0;
 
+/// Factors of which one logarithm is taken, and products that are made side by side.
+const FACTORS: usize = 8;
+const SIDE_BY_SIDE: usize = 8;
+
 /// Mean of `log(1 + |r|² / (3 px)²)`.
 pub(super) fn robust_cost(residuals: &[Residual]) -> f64 {
-    let sum: f64 = residuals.iter().map(|r| (r.norm_squared() / (ROBUST_PX * ROBUST_PX)).ln_1p()).sum();
+    let of_some = |some: &[Residual]| -> f64 {
+        // 1 + p times 1 + x is 1 + (p + x + p x), which keeps what is far below one.
+        let mut products = [0.0; SIDE_BY_SIDE];
+        for side_by_side in some.chunks(SIDE_BY_SIDE) {
+            for (p, r) in products.iter_mut().zip(side_by_side) {
+                let x = r.norm_squared() / (ROBUST_PX * ROBUST_PX);
+                *p += x + *p * x;
+            }
+        }
+        products.into_iter().map(f64::ln_1p).sum()
+    };
+    let sum: f64 = residuals.chunks(FACTORS * SIDE_BY_SIDE).map(of_some).sum();
     sum / residuals.len().max(1) as f64
 }
 
@@ -95,4 +110,27 @@ pub(super) fn start(work: &Work<'_, '_>, flaw: Flaw, beside: &Theta) -> Theta {
 pub(super) fn span(work: &Work<'_, '_>) -> (f64, f64) {
     let frames = &work.scene.frames;
     (frames.first().map_or(0.0, |f| f.t_s), frames.last().map_or(0.0, |f| f.t_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn logarithms_of_products_are_sums_of_logarithms(lengths in prop::collection::vec(-9.0..6.0_f64, 0..300)) {
+            let residuals: Vec<Residual> = lengths.iter().map(|l| Residual::new(10_f64.powf(*l), 0.5)).collect();
+            let one = |r: &Residual| (r.norm_squared() / (ROBUST_PX * ROBUST_PX)).ln_1p();
+            let expected = residuals.iter().map(one).sum::<f64>() / residuals.len().max(1) as f64;
+            prop_assert!((robust_cost(&residuals) - expected).abs() <= 1e-13 * expected);
+        }
+    }
+
+    #[test]
+    fn tiny_and_huge_residuals_cost_what_they_should() {
+        let of = |px: f64| robust_cost(&[Residual::new(px, 0.0); 64]);
+        assert!((of(1e-9) / (1e-18 / 9.0) - 1.0).abs() < 1e-12);
+        assert!((of(1e12) / (24.0 * 10_f64.ln() - 9_f64.ln()) - 1.0).abs() < 1e-12);
+    }
 }

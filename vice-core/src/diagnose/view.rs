@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector2, Vector3};
+use nalgebra::{Point3, Vector3};
 
 use super::DiagnoseError;
+use super::carry::{CameraNumbers, residuals_px};
 use super::flaw::Flaw;
 use super::motion::Motion;
 use super::motion::Reader;
@@ -29,14 +30,13 @@ pub(super) struct View<'s, 'a> {
 }
 
 impl<'a> Scene<'a> {
-    /// Residuals with the flaws taken out; `None` where a label cannot be carried.
+    /// Residuals with the flaws taken out; NaN where a label cannot be carried.
     pub(super) fn residuals(
         &self,
         theta: &Theta,
         motion: &Motion<'_>,
-    ) -> Result<Vec<Option<Residual>>, DiagnoseError> {
-        let view = self.view(theta, motion)?;
-        Ok(self.labels.iter().map(|l| view.residual(l)).collect())
+    ) -> Result<Vec<Residual>, DiagnoseError> {
+        Ok(self.view(theta, motion)?.residuals())
     }
 
     pub(super) fn view<'s>(
@@ -88,12 +88,16 @@ impl View<'_, '_> {
         self.cameras[frame]
     }
 
-    pub(super) fn residual(&self, label: &Label) -> Option<Residual> {
-        let point = self.points[label.segment]?;
-        let camera = self.world_from_camera(label.frame, label.px)?;
-        let local = camera.rotation().inverse() * (point.coords - camera.translation());
-        let px = self.camera.project(&Point3::from(local)).ok()?;
-        Some(Vector2::new(px.u - label.px.u, px.v - label.px.v))
+    /// Where each label's point is carried minus the label, pixels; NaN where it cannot be carried.
+    pub(super) fn residuals(&self) -> Vec<Residual> {
+        let at_frames: Vec<Option<CameraNumbers>> =
+            self.placed.iter().map(|camera| camera.as_ref().map(CameraNumbers::of)).collect();
+        let camera = |label: &Label| match at_frames.get(label.frame) {
+            Some(numbers) => *numbers,
+            None => self.world_from_camera(label.frame, label.px).as_ref().map(CameraNumbers::of),
+        };
+        let asked = |label: &Label| Some((camera(label)?, self.points[label.segment]?, label.px));
+        residuals_px(&self.camera, self.scene.labels.iter().map(asked))
     }
 
     /// How a label's pixel moves with its point in the world (pixels a metre), and the lever from the body to the point.

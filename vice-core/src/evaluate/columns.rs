@@ -20,6 +20,17 @@ pub(super) struct Columns {
     pub(super) squares_px2: Vec<f64>,
 }
 
+impl Columns {
+    /// Without what they held, and with room for so many samples.
+    pub(super) fn empty(&mut self, count: usize) {
+        // All at once: what grows takes twice the room on its way.
+        self.jumps_px.clear();
+        self.jumps_px.reserve_exact(count);
+        self.squares_px2.clear();
+        self.squares_px2.reserve_exact(count);
+    }
+}
+
 /// Columns of one segment, used again for the next.
 #[derive(Default)]
 pub(super) struct Scratch {

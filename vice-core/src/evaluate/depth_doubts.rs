@@ -4,7 +4,7 @@
 use nalgebra::Point3;
 
 use super::DepthTable;
-use super::score::Scorer;
+use super::score::{Scored, Scorer};
 use super::select::{SelectedPoint, SelectedSegment};
 use crate::camera::Pixel;
 use crate::depth::DepthSource;
@@ -30,14 +30,17 @@ pub(super) struct OtherDepths<'a> {
 /// The doubtful key frames, by point and in time; and the factor that nearly all points ask for, where there is one.
 pub(super) fn depth_doubts(
     scorer: &Scorer<'_>,
+    scored: &Scored,
     others: &[OtherDepths<'_>],
 ) -> (Vec<DepthDoubt>, Option<(f64, usize, usize)>) {
     let mut found = Vec::new();
     let mut lifted = Lifted { scorer, tracks: Vec::new() };
     let points = &scorer.evaluation.selection.points;
+    let mut with_samples = scored.segments.iter().peekable();
     let segments = points.iter().enumerate().flat_map(|(p, of)| (0..of.segments.len()).map(move |s| (p, s)));
     for (place, (point, segment)) in segments.enumerate() {
         let of = &points[point].segments[segment];
+        let scored = with_samples.next_if(|s| (s.point, s.segment) == (point, segment));
         let Some(Ok(depth)) = scorer.depths.get(point, segment) else { continue };
         let answers =
             others.iter().filter_map(|o| Some((o.source.name(), o.depths.get(point, segment)?.ok()?.z_m)));
@@ -58,6 +61,7 @@ pub(super) fn depth_doubts(
             alone,
             point_camera_m,
             at_keyframe,
+            squares_px2: scored.map(|s| s.errors.squares_px2()),
         });
     }
     let Doubts { points: doubted, common } = doubts(scorer.evaluation.camera, &lifted);
@@ -109,6 +113,8 @@ struct Track {
     alone: bool,
     point_camera_m: Point3<f64>,
     at_keyframe: WorldFromCamera,
+    /// Sum of the squared errors of all its samples.
+    squares_px2: Option<f64>,
 }
 
 /// The key points with their views, which are gathered where they are asked for: those of all would fill the memory.
@@ -142,6 +148,10 @@ impl LiftedTracks for Lifted<'_> {
         let track = &self.tracks[track];
         let views: Vec<(usize, Pixel)> = self.views(track).collect();
         LiftedTrack::along(track.point_camera_m, track.at_keyframe, &self.scorer.path, &views)
+    }
+
+    fn squares_px2(&self, track: usize) -> Option<f64> {
+        self.tracks[track].squares_px2
     }
 }
 

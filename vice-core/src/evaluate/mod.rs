@@ -210,6 +210,7 @@ fn run(
         step();
     }
     let mut pixel = Vec::new();
+    let mut room = Vec::new();
     for (place, source) in evaluation.depths.iter().enumerate() {
         // Depths are shared, so that one look by the best motion there is, the reference's, is enough.
         let mut by_reference = None;
@@ -225,7 +226,7 @@ fn run(
                 windows: Some(&windows),
                 ..Scorer::new(evaluation, &cameras, poses, known[place].of(index))
             };
-            let scored = score::score(&scorer, to_sink).map_err(EvaluateError::Samples)?;
+            let mut scored = score::score(&scorer, to_sink, &mut room).map_err(EvaluateError::Samples)?;
             let rmse_px = subset_rmse_px(&scored.errors, &sizes);
             let spread = spread::spread(&scorer, &scored, &windows);
             let samples = scored.errors.iter().map(|e| e.count).sum();
@@ -234,7 +235,7 @@ fn run(
             let doubts = match &by_reference {
                 Some(doubts) => Vec::clone(doubts),
                 None => {
-                    let (doubts, common) = depth_doubts(&scorer, &others(&known, place, index));
+                    let (doubts, common) = depth_doubts(&scorer, &scored, &others(&known, place, index));
                     let own = reference.is_none().then_some(stream.name.as_str());
                     let keyframes = scored.keyframes.len();
                     suspicions.extend(depth_doubts::suspicions(
@@ -267,6 +268,7 @@ fn run(
                 depth_doubts: doubts,
                 samples: scored.samples,
             });
+            room = std::mem::take(&mut scored.columns);
             step();
         }
     }

@@ -66,16 +66,24 @@ const POINTS_AT_A_TIME: usize = 32;
 /// Takes the samples of one point.
 pub(super) type TakePoint<'a> = &'a mut dyn FnMut(&[Sample]) -> std::io::Result<()>;
 
-/// Scores all points. Their samples go to `sink` where there is one, in the order of the points.
+/// Scores all points. Their samples go to `sink` where there is one, in the order of the points. `room` are columns of
+/// another stream that are no longer needed: memory that need not be asked for again.
 ///
 /// # Errors
 /// Those of the sink.
-pub(super) fn score(scorer: &Scorer<'_>, mut sink: Option<TakePoint<'_>>) -> std::io::Result<Scored> {
+pub(super) fn score(
+    scorer: &Scorer<'_>,
+    mut sink: Option<TakePoint<'_>>,
+    room: &mut Vec<Columns>,
+) -> std::io::Result<Scored> {
     let mut all = Scored::default();
     for (chunk, some) in scorer.evaluation.selection.points.chunks(POINTS_AT_A_TIME).enumerate() {
         let first = chunk * POINTS_AT_A_TIME;
-        let one = |(place, point): (usize, &SelectedPoint<'_>)| scorer.point(first + place, point);
-        let points: Vec<ScoredPoint> = some.par_iter().enumerate().map(one).collect();
+        let one = |(place, (point, columns)): (usize, (&SelectedPoint<'_>, Columns))| {
+            scorer.point(first + place, point, columns)
+        };
+        let columns: Vec<Columns> = some.iter().map(|_| room.pop().unwrap_or_default()).collect();
+        let points: Vec<ScoredPoint> = some.par_iter().zip(columns).enumerate().map(one).collect();
         for point in points {
             all.errors.push(point.errors);
             match &mut sink {
@@ -122,15 +130,13 @@ impl<'a> Scorer<'a> {
         Self { evaluation, placed, path, depths, keep_samples: false, windows: None }
     }
 
-    fn point(&self, place: usize, point: &SelectedPoint<'_>) -> ScoredPoint {
+    fn point(&self, place: usize, point: &SelectedPoint<'_>, columns: Columns) -> ScoredPoint {
         let name = PointName(point.name.clone());
-        let mut scored = ScoredPoint::default();
+        let mut scored = ScoredPoint { columns, ..ScoredPoint::default() };
         let mut scratch = Scratch::default();
         if self.windows.is_some() {
-            // All at once: what grows takes twice the room on its way.
             let count = point.segments.iter().map(|s| s.count).sum();
-            scored.columns.jumps_px.reserve_exact(count);
-            scored.columns.squares_px2.reserve_exact(count);
+            scored.columns.empty(count);
         }
         scored.skipped.extend(point.skips.iter().map(|(stamp, reason)| skip(&name, *stamp, *reason)));
         for segment in 0..point.segments.len() {

@@ -10,7 +10,7 @@ use crate::metrics::by_age::{Errors, SegmentErrors, Window, errors, errors_at};
 use crate::metrics::held::{Aside, Segments, set_aside};
 use crate::metrics::interval::{Estimated, FEWEST_SEGMENTS};
 use crate::result::{AsideReason, Figure, HeldPart, PointName, SetAside, WindowPart};
-use crate::statistics::{at_ranks, median_in_parts};
+use crate::statistics::Counted;
 use crate::suspicion::Suspicion;
 
 use super::streams::PosesAtFrames;
@@ -126,17 +126,18 @@ pub(super) fn spread(scorer: &Scorer<'_>, scored: &Scored, windows: &Windows<'_>
         }
     }
     let squares: Vec<&[f64]> = scored.columns.iter().map(|c| c.squares_px2.as_slice()).collect();
+    let counted = Counted::new(&squares, |_| true);
     let held = HeldPart {
         segments: all.px.segments as u64,
         points: all.px.points as u64,
         samples: all.px.samples,
-        median_px: median_in_parts(&squares, |_| true).map(f64::sqrt),
+        median_px: counted.median().map(f64::sqrt),
         mrad: all.angle_rad.map(|e| figure(&e, MILLI)),
         mm: all.offset_m.map(|e| figure(&e, MILLI)),
         degrees_of_freedom: all.px.degrees_of_freedom,
         note: note(&all.px),
         heaviest_segment_share: heaviest_segment(segments),
-        heaviest_percent_share: heaviest_percent(&squares),
+        heaviest_percent_share: heaviest_percent(&squares, &counted),
         set_aside: list(&asked, &aside, windows),
     };
     Spread {
@@ -220,14 +221,14 @@ fn heaviest_segment(segments: &[ScoredSegment]) -> f64 {
 }
 
 /// Share of the squared error of the largest 1 % of the samples.
-fn heaviest_percent(squares: &[&[f64]]) -> f64 {
-    let count: u64 = squares.iter().map(|part| part.len() as u64).sum();
+fn heaviest_percent<W: Fn(&f64) -> bool + Sync>(squares: &[&[f64]], counted: &Counted<'_, f64, W>) -> f64 {
+    let count = counted.total;
     let all: f64 = squares.iter().flat_map(|part| part.iter()).sum();
     let few = count.div_ceil(100);
     if few == 0 || all <= 0.0 {
         return 0.0;
     }
-    let Some(least) = at_ranks(squares, |_| true, &[count - few]).first().copied() else { return 0.0 };
+    let Some(least) = counted.at_ranks(&[count - few]).first().copied() else { return 0.0 };
     let (mut above, mut sum) = (0_u64, 0.0);
     for square in squares.iter().flat_map(|part| part.iter()).filter(|v| **v > least) {
         above += 1;

@@ -38,7 +38,7 @@ impl<'a> Trial<'a> {
         let depths = keyframe_depths(e, e.depths[depth], &cameras, &at(e.anchor_of(stream)))?;
         // Only a sink can fail, and there is none.
         let scorer = Scorer::new(e, &cameras, &at(stream), &depths);
-        let errors = score(&scorer, None).map_or_else(|_| Vec::new(), |all| all.errors);
+        let errors = score(&scorer, None, &mut Vec::new()).map_or_else(|_| Vec::new(), |all| all.errors);
         Ok((pooled_rmse_px(&errors).unwrap_or(0.0), errors.iter().map(|e| e.count as usize).sum()))
     }
 }

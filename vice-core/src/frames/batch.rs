@@ -60,6 +60,13 @@ impl<N: Number> Varying<N> {
         }
     }
 
+    /// A rotation of many points, or of one, in the order of operations of a unit quaternion's product with a vector.
+    #[inline(always)]
+    pub(crate) fn turn([i, j, k, w]: [N; 4], [x, y, z]: [N; 3]) -> [N; 3] {
+        let (a, b, c) = ((j * z - k * y) * 2.0, (k * x - i * z) * 2.0, (i * y - j * x) * 2.0);
+        [a * w + (j * c - k * b) + x, b * w + (k * a - i * c) + y, c * w + (i * b - j * a) + z]
+    }
+
     /// [`Motion::apply`] to one point.
     #[inline(always)]
     pub(crate) fn apply(&self, [x, y, z]: [f64; 3]) -> [N; 3] {

@@ -15,7 +15,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use crate::statistics::{median, median_in_parts};
+use crate::statistics::{Counted, median};
 
 /// Median of the length of a vector of two Gaussian components of deviation one.
 const MEDIAN_LENGTH: f64 = 1.1774;
@@ -89,7 +89,7 @@ fn labels(
     aside: &mut BTreeMap<usize, Aside>,
 ) {
     let parts: Vec<&[f32]> = (0..segments.count()).map(|s| segments.jumps_px(s)).collect();
-    let Some(typical) = median_in_parts(&parts, |d| *d > 0.0) else { return };
+    let Some(typical) = Counted::new(&parts, |d| *d > 0.0).median() else { return };
     let limit = LEAST_PX.max(DEVIATIONS * typical / MEDIAN_LENGTH);
     let flagged = |d: &f32| f64::from(*d) > limit;
     let mut jumps: Vec<Jump> = Vec::new();

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::measure::Program;
-use crate::{Result, bags, flight, surfaces};
+use crate::{Result, bags, flight, pictures, surfaces};
 
 const SIZES: [usize; 3] = [1_000, 10_000, 100_000];
 /// Points of a flight whose frames grow.
@@ -20,12 +20,14 @@ pub(crate) struct Case {
     pub(crate) grows: &'static str,
     pub(crate) sizes: [usize; 3],
     pub(crate) prepare: Prepare,
+    /// What a run leaves in the folder, where the next one would find it.
+    pub(crate) made: &'static [&'static str],
     /// Why it may grow faster than what it is given.
     pub(crate) reason: Option<&'static str>,
 }
 
 const fn case(command: &'static str, grows: &'static str, prepare: Prepare) -> Case {
-    Case { command, grows, sizes: SIZES, prepare, reason: None }
+    Case { command, grows, sizes: SIZES, prepare, made: &[], reason: None }
 }
 
 fn words(line: &str) -> Vec<String> {
@@ -40,6 +42,7 @@ pub(crate) fn all() -> Vec<Case> {
     all.extend(labels());
     all.extend(recordings());
     all.extend(surfaces());
+    all.extend(pictures());
     all
 }
 
@@ -132,8 +135,21 @@ fn labels() -> [Case; 11] {
     ]
 }
 
-fn recordings() -> [Case; 5] {
+fn recordings() -> [Case; 7] {
     [
+        case("`check`", "frames", |folder, n, _| {
+            flight::write(folder, n, 0)?;
+            Ok(words("check flight --estimate estimate.txt"))
+        }),
+        Case {
+            sizes: [10, 100, 1_000],
+            made: &["out"],
+            ..case("`batch`", "runs of 10 labels", |folder, n, _| {
+                flight::write(folder, FRAMES, 1)?;
+                flight::write_manifest(&folder.join("runs.csv"), n)?;
+                Ok(words("batch runs.csv --out out --samples none"))
+            })
+        },
         case("`info` of a folder", "frames", |folder, n, _| {
             flight::write(folder, n, 0)?;
             Ok(words("info flight"))
@@ -182,5 +198,55 @@ fn surfaces() -> [Case; 3] {
             surfaces::write_scan(folder, n)?;
             Ok(words("floor fit flight"))
         }),
+    ]
+}
+
+/// Frames with pictures.
+const PICTURES: [usize; 3] = [20, 60, 180];
+
+/// A flight with pictures, as `vice synth` makes it.
+fn synthetic(folder: &Path, frames: usize, program: &Program) -> Result<()> {
+    program.run(folder, &words(&format!("synth flight --duration {} --rate 20", frames as f64 / 20.0)))?;
+    Ok(())
+}
+
+fn pictures() -> [Case; 4] {
+    let of_pictures = |command, prepare, made| Case {
+        sizes: PICTURES,
+        made,
+        ..case(command, "frames with pictures", prepare)
+    };
+    [
+        of_pictures(
+            "`synth`",
+            |_, n, _| Ok(words(&format!("synth flight --duration {} --rate 20", n as f64 / 20.0))),
+            &["flight"],
+        ),
+        of_pictures(
+            "`overlay` to a folder",
+            |folder, n, program| {
+                synthetic(folder, n, program)?;
+                let streams = "--labels flight/labels/floor.csv --estimate flight/estimates/drift.txt";
+                Ok(words(&format!("overlay flight {streams} --depth floor --out out")))
+            },
+            &["out"],
+        ),
+        of_pictures(
+            "`labels track`",
+            |folder, n, program| {
+                synthetic(folder, n, program)?;
+                Ok(words("labels track flight --depth floor --out out.json"))
+            },
+            &["out.json"],
+        ),
+        of_pictures(
+            "`labels detect` of a chessboard",
+            |folder, n, _| {
+                flight::write(folder, n, 0)?;
+                pictures::write_boards(folder, n)?;
+                Ok(words("labels detect flight --chessboard 7x5 --out out.json"))
+            },
+            &["out.json"],
+        ),
     ]
 }

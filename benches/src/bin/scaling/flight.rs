@@ -32,3 +32,13 @@ pub(crate) fn write_turning(folder: &Path, poses: usize) -> Result<()> {
     }
     Ok(())
 }
+
+/// Writes a manifest of so many runs of the flight that lies beside it; each starts a little later, so that none is another.
+pub(crate) fn write_manifest(path: &Path, runs: usize) -> Result<()> {
+    let mut file = create(path)?;
+    writeln!(file, "run_id,group,dataset,labels,estimate,depth,start")?;
+    for i in 0..runs {
+        writeln!(file, "run{i},g,flight,labels.csv,estimate.txt,floor,{}", i as f64 * 1e-6)?;
+    }
+    Ok(file.flush()?)
+}

@@ -1,10 +1,11 @@
-//! How the cost of each command grows with what it is given: every command that has a size, at 10^3, 10^4 and 10^5.
+//! How the cost of each command grows with what it is given: every command that has a size, at 10^3, 10^4 and 10^5; those
+//! that make or read pictures at fewer.
 //!
 //! usage: `cargo run --release -p vice-benches --bin scaling [-- --vice PROGRAM] [--only WORD] [--write FILE]`
 //!
 //! The program is built here unless `--vice` names one. It runs on data that are made for it in a folder that is removed
 //! afterwards. Of several runs the fastest counts, less what the program takes to start. The exponent is that of the last
-//! decade: 1 is linear, and above 1.2 a command is at fault unless the table gives a reason. `--only` takes the commands
+//! two sizes: 1 is linear, and above 1.2 a command is at fault unless the table gives a reason. `--only` takes the commands
 //! in whose line the word occurs. `--write` puts the table between the markers of docs/performance.md.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
@@ -12,6 +13,7 @@ mod bags;
 mod cases;
 mod flight;
 mod measure;
+mod pictures;
 mod surfaces;
 mod table;
 
@@ -70,13 +72,14 @@ fn main() -> Result<()> {
         let mut row =
             Row { command: case.command, grows: case.grows, reason: case.reason, measured: Vec::new() };
         for size in case.sizes {
-            // A decade more costs ten times as much at least.
-            if row.measured.last().is_some_and(|(_, m)| 10.0 * m.seconds > LONGEST) {
+            // So many times more cost as many times as much at least.
+            let times = |n: usize| size as f64 / n as f64;
+            if row.measured.last().is_some_and(|(n, m)| times(*n) * m.seconds > LONGEST) {
                 break;
             }
             let folder = tempfile::tempdir()?;
             let cost = (case.prepare)(folder.path(), size, &program)
-                .and_then(|arguments| program.least(folder.path(), &arguments));
+                .and_then(|arguments| program.least(folder.path(), &arguments, case.made));
             match cost {
                 Ok(cost) => {
                     eprintln!("  {size}: {:.3} s, {:.0} MiB", cost.seconds, cost.peak_mib);

@@ -20,7 +20,7 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    /// Of the last decade; `None` where its lower end is noise or there is none.
+    /// Of the last two sizes; `None` where its lower end is noise or there is none.
     pub(crate) fn exponent(&self) -> Option<f64> {
         let [.., (n, before), (m, after)] = self.measured.as_slice() else { return None };
         let decades = (*m as f64 / *n as f64).log10();

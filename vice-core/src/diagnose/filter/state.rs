@@ -1,6 +1,7 @@
 //! The state of the pass: its covariance and one mean for each column.
 
 use super::super::geometry::SegmentAnswer;
+use super::means::Means;
 
 /// Numbers of a followed point: its place and the walk of its label.
 pub(super) const SLOT: usize = 5;
@@ -17,8 +18,7 @@ pub(super) struct State {
     pub(super) stride: usize,
     /// Covariance, row by row, symmetric.
     pub(super) p: Vec<f64>,
-    /// One vector for each column.
-    pub(super) means: Vec<Vec<f64>>,
+    pub(super) means: Means,
     /// Where the pose with its jitter stands.
     pub(super) now: usize,
     /// Slots that are free.
@@ -34,7 +34,7 @@ impl State {
             n: first_slot,
             stride,
             p: vec![0.0; stride * stride],
-            means: vec![vec![0.0; stride]; width],
+            means: Means::new(stride, width),
             now,
             free: (0..most_followed).rev().map(|i| first_slot + SLOT * i).collect(),
         }
@@ -47,9 +47,7 @@ impl State {
                 self.p[i * self.stride + k] = 0.0;
                 self.p[k * self.stride + i] = 0.0;
             }
-            for mean in &mut self.means {
-                mean[i] = 0.0;
-            }
+            self.means.clear(i);
         }
     }
 
@@ -63,9 +61,7 @@ impl State {
         for k in 0..self.n {
             self.p[k * s + to] += times * self.p[k * s + from];
         }
-        for mean in &mut self.means {
-            mean[to] += times * mean[from];
-        }
+        self.means.add(to, from, times);
     }
 
     #[inline(always)]
@@ -77,9 +73,7 @@ impl State {
         for k in 0..self.n {
             self.p[k * s + at] *= times;
         }
-        for mean in &mut self.means {
-            mean[at] *= times;
-        }
+        self.means.scale(at, times);
     }
 
     #[inline(always)]
@@ -104,10 +98,7 @@ impl State {
         for i in 0..POSE {
             self.widen(now + i, jitter[i] * jitter[i]);
         }
-        for mean in &mut self.means {
-            let (before, after) = mean.split_at_mut(now);
-            after[..POSE].copy_from_slice(&before[..POSE]);
-        }
+        self.means.copy(0, now, POSE);
     }
 
     /// A key frame: the error of the point's place, from that of the pose, the label (of this variance) and the depth.
@@ -140,9 +131,10 @@ impl State {
         for (i, row) in block.iter().enumerate() {
             self.p[(slot + i) * s + slot..(slot + i) * s + slot + 3].copy_from_slice(row);
         }
-        for mean in &mut self.means {
-            for i in 0..3 {
-                mean[slot + i] = (0..POSE).map(|m| segment.by_pose[(i, m)] * mean[now + m]).sum();
+        for i in 0..3 {
+            self.means.clear(slot + i);
+            for m in 0..POSE {
+                self.means.add(slot + i, now + m, segment.by_pose[(i, m)]);
             }
         }
     }

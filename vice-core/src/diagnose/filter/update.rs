@@ -13,6 +13,8 @@ const ROWS: usize = 2 * AT_ONCE;
 const TERMS: usize = POSE + 4;
 /// Registers of a row of the covariance that are worked on at a time.
 const REGISTERS: usize = 4;
+/// Numbers of the state whose means are worked on at a time.
+const NUMBERS: usize = 4;
 
 /// One coordinate of a label: how it answers to the state, and its variance.
 #[derive(Clone, Copy, Debug)]
@@ -167,24 +169,63 @@ impl Update {
         }
     }
 
-    /// Takes the measured rows of one column into its mean; they become independent, of unit variance.
+    /// Takes the measured rows of all columns into their means; they become independent, of unit variance. `measured` holds
+    /// row by row as many numbers as the means have columns.
     #[inline(always)]
-    pub(super) fn mean(&self, mean: &mut [f64], rows: &[Row], measured: &mut [f64]) {
-        let s = self.stride;
-        for (row, value) in rows.iter().zip(measured.iter_mut()) {
-            for (i, times) in row.terms {
-                *value -= times * mean[i];
+    pub(super) fn mean<S: Simd>(&self, simd: S, state: &mut State, rows: &[Row], measured: &mut [f64]) {
+        let n = state.n;
+        let at_once = state.means.width() / S::F64_LANES;
+        let (means, _) = S::as_mut_simd_f64s(state.means.rows_mut(n));
+        let (measured, _) = S::as_mut_simd_f64s(measured);
+        for at in 0..at_once {
+            let mut solved = [simd.splat_f64s(0.0); ROWS];
+            for a in 0..rows.len() {
+                let mut sum = measured[a * at_once + at];
+                for t in 0..TERMS {
+                    let (i, times) = rows[a].terms[t];
+                    let times = simd.splat_f64s(times);
+                    sum = simd.sub_f64s(sum, simd.mul_f64s(times, means[i * at_once + at]));
+                }
+                for b in 0..a {
+                    let times = simd.splat_f64s(self.lower[a][b]);
+                    sum = simd.sub_f64s(sum, simd.mul_f64s(times, solved[b]));
+                }
+                solved[a] = simd.mul_f64s(sum, simd.splat_f64s(self.inverse[a]));
+                measured[a * at_once + at] = solved[a];
+            }
+            let mut k = 0;
+            while k + NUMBERS <= n {
+                self.add_some::<S, NUMBERS>(simd, (k, at, at_once), means, &solved[..rows.len()]);
+                k += NUMBERS;
+            }
+            while k < n {
+                self.add_some::<S, 1>(simd, (k, at, at_once), means, &solved[..rows.len()]);
+                k += 1;
             }
         }
-        for a in 0..rows.len() {
-            let mut sum = measured[a];
-            for b in 0..a {
-                sum -= self.lower[a][b] * measured[b];
-            }
-            measured[a] = sum * self.inverse[a];
+    }
+
+    /// Some numbers of the state from `k` on, of the columns of one register.
+    #[inline(always)]
+    fn add_some<S: Simd, const N: usize>(
+        &self,
+        simd: S,
+        (k, at, at_once): (usize, usize, usize),
+        means: &mut [S::f64s],
+        solved: &[S::f64s],
+    ) {
+        let mut sums = [simd.splat_f64s(0.0); N];
+        for i in 0..N {
+            sums[i] = means[(k + i) * at_once + at];
         }
-        for (value, row) in measured.iter().zip(self.rows.chunks_exact(s)) {
-            add_times(&mut mean[..s], *value, &row[..s]);
+        for a in 0..solved.len() {
+            let row = &self.rows[a * self.stride + k..a * self.stride + k + N];
+            for i in 0..N {
+                sums[i] = simd.add_f64s(sums[i], simd.mul_f64s(solved[a], simd.splat_f64s(row[i])));
+            }
+        }
+        for i in 0..N {
+            means[(k + i) * at_once + at] = sums[i];
         }
     }
 }
