@@ -46,6 +46,7 @@ pub fn main_from(args: impl IntoIterator<Item = OsString>, itself: Itself) -> u8
         Command::Evaluate(args) => commands::evaluate::run(args, verbosity),
         Command::Diagnose(args) => commands::diagnose::run(args, verbosity),
         Command::Trajectory(args) => commands::trajectory::run(args),
+        Command::Init(args) => commands::init::run(args, verbosity),
         Command::Info(args) => commands::info::run(args),
         Command::Formats(args) => commands::formats::run(args),
         Command::Plugin(command) => commands::plugin::run(command, &itself),

@@ -106,6 +106,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     let outputs =
         Outputs::new(&[&files.json, &files.csv, &files.latex, &files.report, &samples], &request.inputs())?;
     let opened = request.open()?;
+    let request = args.evaluation.completed(request, &opened)?;
     // The page plots samples even where the document is to list none.
     let keep = files.report.is_some() || (files.samples == SamplesTo::All && files.json.is_some());
     let mut document = with_progress(verbosity, |progress| match &samples {

@@ -1,0 +1,50 @@
+//! `vice init`.
+
+use std::path::PathBuf;
+
+use vice_run::init::{InitRequest, init};
+
+use crate::inputs::{PluginArgs, positive, to_json};
+use crate::terminal::{self, Outcome, Verbosity};
+
+/// Arguments of `vice init`.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  vice init my_robot               (a folder of images, poses and a calibration)\n  \
+    vice init my_robot --fps 30      (the names of the images say no stamps)\n  \
+    vice init run.bag                (writes run.bag.vice.toml)\n\n\
+    It asks nothing: what it guessed and what it could not know stands in the file, which every command reads."
+)]
+pub(crate) struct Args {
+    /// Folder or file of the data set.
+    #[arg(value_name = "DATASET")]
+    path: PathBuf,
+    /// Images a second, where neither their names nor a list say when they were taken.
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    fps: Option<f64>,
+    /// Replace a vice.toml that exists.
+    #[arg(long)]
+    force: bool,
+    /// Print what was found as JSON, vice.init/1.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    plugins: PluginArgs,
+}
+
+pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
+    let request = InitRequest {
+        path: args.path.clone(),
+        fps: args.fps,
+        force: args.force,
+        plugins: args.plugins.spec(),
+    };
+    let document = init(&request)?;
+    if args.json {
+        terminal::print(&to_json(&document)?)?;
+        return Ok(Outcome::Done);
+    }
+    terminal::print(&document.summary())?;
+    verbosity.note(&format!("look at it with `vice info {0}` and `vice check {0}`", args.path.display()));
+    Ok(Outcome::Done)
+}
