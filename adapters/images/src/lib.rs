@@ -35,7 +35,7 @@ use std::path::{Path, PathBuf};
 use vice_core::dataset::{Dataset, DatasetFactory, FormatInfo, OpenOptions, Probe, SettingInfo};
 use vice_core::error::{DataError, DataResult, ErrorKind};
 
-pub use guess::{Guess, guess};
+pub use guess::{Guess, GuessedCamera, When, guess};
 use layouts::Layout;
 use settings::Settings;
 
