@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use vice_core::camera::Camera;
 use vice_core::dataset::{Calibrated, Dataset, Floor, OpenOptions, Plane};
-use vice_core::error::ErrorKind;
+use vice_core::error::{DataError, ErrorKind};
 use vice_core::evaluate::{DatasetRig, Observations};
 use vice_core::frames::World;
 use vice_core::registry::Registry;
@@ -71,7 +71,8 @@ impl DatasetSpec {
         let place = Place::of_data_set(&self.path)?;
         // A small file first: a mistake in it may be why the data set does not open.
         let told = place.told(Told::of(place.path()))?;
-        let dataset = place.told(registry.open(place.path(), self.format.as_deref(), &options))?;
+        let dataset = registry.open(place.path(), self.format.as_deref(), &options);
+        let dataset = place.told(dataset.map_err(|e| describable(e, &self.path)))?;
         let dataset: Arc<dyn Dataset> = match place.is_elsewhere() {
             true => Arc::new(Away { inner: dataset, place: place.kept() }),
             false => Arc::from(dataset),
@@ -181,6 +182,17 @@ impl DatasetSpec {
         let plane = Plane::<World>::new([nx, ny, nz], d)
             .map_err(|e| RunError::usage("floor-plane", e.to_string()))?;
         Ok(Some(Floor::World(plane)))
+    }
+}
+
+/// A folder that no format knows may be one of images that nobody described.
+fn describable(error: DataError, path: &Path) -> DataError {
+    match error.hint_text() {
+        Some(hint) if path.is_dir() && error.problem().starts_with("no format recognises") => {
+            let hint = format!("a folder of images is described by `vice init {}`; {hint}", path.display());
+            error.hint(hint)
+        }
+        _ => error,
     }
 }
 

@@ -43,3 +43,4 @@ mod synthetic;
 mod tracker_oracle;
 mod trajectory_oracle;
 mod verdict;
+mod your_robot;
