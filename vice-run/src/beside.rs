@@ -51,7 +51,11 @@ impl Told {
     ///
     /// # Errors
     /// [`DataError`] for a key that is not known, or one that does not fit the data set.
-    pub(crate) fn apply(self, dataset: Arc<dyn Dataset>, registry: &Registry) -> DataResult<Arc<dyn Dataset>> {
+    pub(crate) fn apply(
+        self,
+        dataset: Arc<dyn Dataset>,
+        registry: &Registry,
+    ) -> DataResult<Arc<dyn Dataset>> {
         let formats: Vec<String> = registry.formats().into_iter().map(|f| f.name).collect();
         let settings: Vec<String> = registry.by_name(dataset.format()).map_or_else(
             |_| Vec::new(),
@@ -132,14 +136,19 @@ impl Beside {
     /// A stream in a file, as poses of the body, in the world that the file has.
     fn stream(&self, name: &str, cell: &OnceLock<TrajectoryFile>) -> DataResult<Trajectory> {
         let entry = &self.told.file.streams[name];
-        let file = cached(cell, || read(&entry.file, &ReadOptions { times: entry.times.clone(), ..ReadOptions::default() }))?;
+        let file = cached(cell, || {
+            read(&entry.file, &ReadOptions { times: entry.times.clone(), ..ReadOptions::default() })
+        })?;
         if !entry.of_camera {
             return Ok(file.trajectory.clone());
         }
         let cameras = self.inner.cameras();
         let camera = cameras.first().ok_or_else(|| {
-            DataError::of_kind(ErrorKind::Contradictory, format!("[streams] {name}: there is no camera whose poses these are"))
-                .at(&self.told.file.path)
+            DataError::of_kind(
+                ErrorKind::Contradictory,
+                format!("[streams] {name}: there is no camera whose poses these are"),
+            )
+            .at(&self.told.file.path)
         })?;
         let poses: Vec<(Stamp, WorldFromBody)> = file
             .trajectory
@@ -287,7 +296,10 @@ impl Dataset for Beside {
         let mut said = Vec::new();
         said.extend(file.calibration.as_ref().map(|p| format!("calibration: {}", p.display())));
         said.extend(file.time_offset.map(|o| format!("time offset of estimates: {} s", o.to_seconds_text())));
-        said.extend(file.up.map(|up| format!("up: {} of the poses' world, which is turned so that z is up", up.text())));
+        said.extend(
+            file.up
+                .map(|up| format!("up: {} of the poses' world, which is turned so that z is up", up.text())),
+        );
         said.extend(file.labels.file.as_ref().map(|p| format!("labels: {}", p.display())));
         let section = file.path.display().to_string();
         let about = said.into_iter().map(|text| Fact { section: section.clone(), text });

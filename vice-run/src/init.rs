@@ -55,8 +55,11 @@ pub struct InitDocument {
 pub fn init(request: &InitRequest) -> RunResult<InitDocument> {
     let path = &request.path;
     if is_address(path) {
-        return Err(RunError::new(ErrorKind::Unsupported, "a vice.toml is written beside data on this machine")
-            .advise("fetch the data, or write the file by hand: docs/formats.md has its keys"));
+        return Err(RunError::new(
+            ErrorKind::Unsupported,
+            "a vice.toml is written beside data on this machine",
+        )
+        .advise("fetch the data, or write the file by hand: docs/formats.md has its keys"));
     }
     if !path.exists() {
         return Err(RunError::missing(format!("{}: no such file or folder", path.display())));
@@ -84,9 +87,17 @@ fn look(request: &InitRequest, file: PathBuf) -> RunResult<InitDocument> {
     match registry.detect(path) {
         Ok((factory, Probe::Collection(runs))) => Err(RunError::new(
             ErrorKind::Usage,
-            format!("{}: a folder of {} data sets ({} of them)", path.display(), factory.info().name, runs.len()),
+            format!(
+                "{}: a folder of {} data sets ({} of them)",
+                path.display(),
+                factory.info().name,
+                runs.len()
+            ),
         )
-        .advise(format!("name one of them, such as {}", runs.first().map_or(String::new(), |r| r.display().to_string())))),
+        .advise(format!(
+            "name one of them, such as {}",
+            runs.first().map_or(String::new(), |r| r.display().to_string())
+        ))),
         Ok((factory, _)) if factory.info().name != vice_images::NAME => {
             known_format(request, &registry, &factory.info().name, file)
         }
@@ -103,7 +114,10 @@ fn known_format(
     file: PathBuf,
 ) -> RunResult<InitDocument> {
     if request.fps.is_some() {
-        return Err(RunError::usage("fps", format!("a data set of the format {format} has stamps of its own")));
+        return Err(RunError::usage(
+            "fps",
+            format!("a data set of the format {format} has stamps of its own"),
+        ));
     }
     let dataset = registry.open(&request.path, Some(format), &OpenOptions::default())?;
     let (mut found, mut unknown) = (Vec::new(), Vec::new());
@@ -126,7 +140,15 @@ fn known_format(
         comment(&mut text, line);
     }
     common(&mut text, &Common::default());
-    Ok(InitDocument { schema: "vice.init/1", file, format: format.to_string(), found, guessed: Vec::new(), unknown, text })
+    Ok(InitDocument {
+        schema: "vice.init/1",
+        file,
+        format: format.to_string(),
+        found,
+        guessed: Vec::new(),
+        unknown,
+        text,
+    })
 }
 
 fn images(guess: &Guess, folder: &Path, file: PathBuf) -> InitDocument {
@@ -135,7 +157,9 @@ fn images(guess: &Guess, folder: &Path, file: PathBuf) -> InitDocument {
         None => "a folder of images".to_string(),
     };
     let mut text = head(&what);
-    for (head, lines) in [("found", &guess.found), ("guessed", &guess.guessed), ("to be filled in", &guess.unknown)] {
+    for (head, lines) in
+        [("found", &guess.found), ("guessed", &guess.guessed), ("to be filled in", &guess.unknown)]
+    {
         if !lines.is_empty() {
             comment(&mut text, &format!("{head}:"));
             lines.iter().for_each(|line| comment(&mut text, &format!("  {line}")));
@@ -148,7 +172,12 @@ fn images(guess: &Guess, folder: &Path, file: PathBuf) -> InitDocument {
         &Common {
             calibration: guess.calibration.as_ref().filter(|_| own).map(below),
             cloud: guess.cloud.as_ref().filter(|_| own).map(below),
-            streams: guess.streams.iter().filter(|_| own).map(|(name, path)| (name.clone(), below(path))).collect(),
+            streams: guess
+                .streams
+                .iter()
+                .filter(|_| own)
+                .map(|(name, path)| (name.clone(), below(path)))
+                .collect(),
             has_extrinsics: guess.has_extrinsics,
         },
     );
@@ -163,7 +192,9 @@ fn images(guess: &Guess, folder: &Path, file: PathBuf) -> InitDocument {
     InitDocument {
         schema: "vice.init/1",
         file,
-        format: guess.layout.map_or_else(|| vice_images::NAME.to_string(), |l| format!("{} ({l})", vice_images::NAME)),
+        format: guess
+            .layout
+            .map_or_else(|| vice_images::NAME.to_string(), |l| format!("{} ({l})", vice_images::NAME)),
         found: guess.found.clone(),
         guessed: guess.guessed.clone(),
         unknown: guess.unknown.clone(),
@@ -181,7 +212,8 @@ struct Common {
 }
 
 fn head(what: &str) -> String {
-    let mut text = String::from("# What VICE is told of this data set, by `vice init`; every command reads it.\n");
+    let mut text =
+        String::from("# What VICE is told of this data set, by `vice init`; every command reads it.\n");
     text.push_str("# Lines that start with # are not read. Paths start at the folder of this file.\n#\n");
     comment(&mut text, what);
     text
@@ -234,9 +266,19 @@ fn common(text: &mut String, known: &Common) {
     };
     match &known.calibration {
         Some(file) => line(text, "calibration", &quoted(file), ""),
-        None => asked(text, "calibration", "\"calibration.yaml\"", "Kalibr, ROS camera_info, OpenCV, sensor.yaml and others"),
+        None => asked(
+            text,
+            "calibration",
+            "\"calibration.yaml\"",
+            "Kalibr, ROS camera_info, OpenCV, sensor.yaml and others",
+        ),
     }
-    asked(text, "floor", "[0.0, 0.0, 1.0, 0.0]", "nx, ny, nz, d of n.p + d = 0 in the world: `vice floor fit` finds it");
+    asked(
+        text,
+        "floor",
+        "[0.0, 0.0, 1.0, 0.0]",
+        "nx, ny, nz, d of n.p + d = 0 in the world: `vice floor fit` finds it",
+    );
     asked(text, "up", "\"z\"", "axis of the poses' world that points up: x, -y, ...");
     asked(text, "time_offset_s", "0.0", "added to the stamps of estimates: `vice clock` finds it");
     match &known.cloud {
@@ -245,12 +287,21 @@ fn common(text: &mut String, known: &Common) {
     }
     asked(text, "world_from_cloud", "[0, 0, 0, 0, 0, 0, 1]", "x y z qx qy qz qw, or a 4x4 matrix row by row");
     text.push_str("\n[streams]\n");
-    let whose = if known.has_extrinsics { "GUESSED: poses of the body" } else { "poses of the camera: it is the body" };
+    let whose = if known.has_extrinsics {
+        "GUESSED: poses of the body"
+    } else {
+        "poses of the camera: it is the body"
+    };
     for (name, file) in &known.streams {
         line(text, &toml_key(name), &quoted(file), whose);
     }
     asked(text, GROUND_TRUTH, "\"groundtruth.txt\"", "the stream of this name is the reference");
-    asked(text, "slam", "{ file = \"slam.txt\", frame = \"camera\" }", "poses of the camera, where a calibration places it");
+    asked(
+        text,
+        "slam",
+        "{ file = \"slam.txt\", frame = \"camera\" }",
+        "poses of the camera, where a calibration places it",
+    );
     text.push_str("\n[labels]\n");
     asked(text, "file", "\"labels.csv\"", "taken where no --labels are named; or \"auto\"");
     asked(text, "points", "[\"a\", \"b\"]", "only these");
@@ -260,16 +311,27 @@ fn camera_table(text: &mut String, camera: &GuessedCamera) {
     let _ = writeln!(text, "\n[images.cameras.{}]", toml_key(&camera.name));
     line(text, "folder", &quoted(&camera.folder), "");
     match &camera.when {
-        When::Names(unit) => line(text, "names", &quoted(unit), "the number in a picture's name is its stamp"),
-        When::List(list) => line(text, "list", &quoted(list), "stamps, one a picture or with the names of the files"),
+        When::Names(unit) => {
+            line(text, "names", &quoted(unit), "the number in a picture's name is its stamp")
+        }
+        When::List(list) => {
+            line(text, "list", &quoted(list), "stamps, one a picture or with the names of the files")
+        }
         When::Fps(fps, start) => {
             line(text, "fps", &format!("{fps:?}"), "the pictures are counted");
             if let Some(start) = start {
-                line(text, "start_s", &quoted(start), "GUESSED: the first picture is taken at the first pose");
+                line(
+                    text,
+                    "start_s",
+                    &quoted(start),
+                    "GUESSED: the first picture is taken at the first pose",
+                );
             }
         }
         When::Unknown => {
-            text.push_str("# fps = 30.0                        # FILL IN: pictures a second; take the # away\n");
+            text.push_str(
+                "# fps = 30.0                        # FILL IN: pictures a second; take the # away\n",
+            );
             text.push_str("# start_s = \"0.0\"                    # stamp of the first picture, on the clock of the poses\n");
         }
     }
@@ -284,7 +346,11 @@ impl InitDocument {
     /// What was done, for people.
     pub fn summary(&self) -> String {
         let mut text = format!("{}: written ({})\n", self.file.display(), self.format);
-        for (head, lines) in [("found", &self.found), ("guessed, look at it", &self.guessed), ("not known, fill it in where it is needed", &self.unknown)] {
+        for (head, lines) in [
+            ("found", &self.found),
+            ("guessed, look at it", &self.guessed),
+            ("not known, fill it in where it is needed", &self.unknown),
+        ] {
             if lines.is_empty() {
                 continue;
             }

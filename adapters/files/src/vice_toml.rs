@@ -41,17 +41,8 @@ use crate::yaml::read_text;
 pub const FILE: &str = "vice.toml";
 
 /// Keys that every format knows; a format that has keys outside of a table of its own leaves these alone.
-pub const COMMON: [&str; 9] = [
-    "calibration",
-    "cloud",
-    "mesh",
-    "world_from_cloud",
-    "floor",
-    "time_offset_s",
-    "up",
-    "streams",
-    "labels",
-];
+pub const COMMON: [&str; 9] =
+    ["calibration", "cloud", "mesh", "world_from_cloud", "floor", "time_offset_s", "up", "streams", "labels"];
 
 /// What a `vice.toml` says.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -205,7 +196,8 @@ impl ViceToml {
         let mut read = Self::parse(&text).map_err(|e| e.at(path))?;
         read.path = path.to_path_buf();
         let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
-        let of_streams = read.streams.values_mut().flat_map(|s| std::iter::once(&mut s.file).chain(&mut s.times));
+        let of_streams =
+            read.streams.values_mut().flat_map(|s| std::iter::once(&mut s.file).chain(&mut s.times));
         let own = [&mut read.calibration, &mut read.cloud, &mut read.labels.file];
         for file in own.into_iter().flatten().chain(of_streams) {
             if *file != Path::new("auto") {
@@ -232,7 +224,8 @@ impl ViceToml {
             return Err(wrong("mesh", "cloud and mesh name two files, and a data set has one scan".into()));
         }
         let cloud = file.cloud.or(file.mesh);
-        let world_from_cloud = file.world_from_cloud.map(|n| place_of(&n).map_err(|e| wrong("world_from_cloud", e)));
+        let world_from_cloud =
+            file.world_from_cloud.map(|n| place_of(&n).map_err(|e| wrong("world_from_cloud", e)));
         let world_from_cloud = world_from_cloud.transpose()?;
         if world_from_cloud.is_some() && cloud.is_none() {
             return Err(wrong("world_from_cloud", "places a cloud, and none is named".into()));
@@ -246,7 +239,10 @@ impl ViceToml {
         let time_offset = seconds.transpose().map_err(|e| wrong("time_offset_s", e.to_string()))?;
         let up = match file.up.as_deref() {
             None => None,
-            Some(word) => Some(Up::parse(word).ok_or_else(|| wrong("up", format!("`{word}` is none of x, y, z, -x, -y, -z")))?),
+            Some(word) => Some(
+                Up::parse(word)
+                    .ok_or_else(|| wrong("up", format!("`{word}` is none of x, y, z, -x, -y, -z")))?,
+            ),
         };
         let mut streams = BTreeMap::new();
         for (name, stream) in file.streams {
@@ -256,7 +252,9 @@ impl ViceToml {
                     let of_camera = match table.frame.as_deref() {
                         None | Some("body") => false,
                         Some("camera") => true,
-                        Some(other) => return Err(wrong(&name, format!("frame = `{other}` is neither body nor camera"))),
+                        Some(other) => {
+                            return Err(wrong(&name, format!("frame = `{other}` is neither body nor camera")));
+                        }
                     };
                     StreamEntry { file: table.file, of_camera, times: table.times }
                 }
@@ -294,7 +292,11 @@ impl ViceToml {
                 Err(DataError::of_kind(ErrorKind::Corrupt, format!("{what} is not known"))
                     .at(&self.path)
                     .line(*line)
-                    .hint(format!("known: {}, and tables of formats: {}", COMMON.join(", "), formats.join(", "))))
+                    .hint(format!(
+                        "known: {}, and tables of formats: {}",
+                        COMMON.join(", "),
+                        formats.join(", ")
+                    )))
             }
         }
     }
@@ -311,10 +313,14 @@ pub fn beside(data_set: &Path) -> Option<PathBuf> {
 
 fn place_of(numbers: &[f64]) -> Result<Rigid<World, Cloud>, String> {
     match *numbers {
-        [x, y, z, qx, qy, qz, qw] => Rigid::try_from_parts([x, y, z], [qw, qx, qy, qz]).map_err(|e| e.to_string()),
+        [x, y, z, qx, qy, qz, qw] => {
+            Rigid::try_from_parts([x, y, z], [qw, qx, qy, qz]).map_err(|e| e.to_string())
+        }
         _ => match <[f64; 16]>::try_from(numbers.to_vec()) {
             Ok(matrix) => Rigid::try_from_row_major(&matrix).map_err(|e| e.to_string()),
-            Err(other) => Err(format!("{} numbers, where 16 (4x4, row by row) or 7 are expected", other.len())),
+            Err(other) => {
+                Err(format!("{} numbers, where 16 (4x4, row by row) or 7 are expected", other.len()))
+            }
         },
     }
 }
@@ -378,7 +384,11 @@ mod tests {
     #[test]
     fn mistakes_are_told_with_their_line() {
         let error = |text: &str| ViceToml::parse(text).unwrap_err().to_string();
-        assert!(error("\nup = \"w\"\n").starts_with("line 2: up: `w` is none"), "{}", error("\nup = \"w\"\n"));
+        assert!(
+            error("\nup = \"w\"\n").starts_with("line 2: up: `w` is none"),
+            "{}",
+            error("\nup = \"w\"\n")
+        );
         assert!(error("[labels]\nfyle = \"x\"\n").contains("line 2"));
         assert!(error("cloud = \"a\"\nmesh = \"b\"\n").starts_with("line 2: mesh"));
         assert!(error("world_from_cloud = [1, 2]\ncloud = \"a\"\n").contains("2 numbers"));

@@ -95,15 +95,24 @@ impl Folder {
                 // Why there is no picture is what has to be known.
                 let frames = self.frames_of(camera)?;
                 let first = frames.file(0)?;
-                return Err(DataError::of_kind(ErrorKind::Missing, "the size of the images is not known: no picture is there")
-                    .at(first));
+                return Err(DataError::of_kind(
+                    ErrorKind::Missing,
+                    "the size of the images is not known: no picture is there",
+                )
+                .at(first));
             }
         };
         let camera = Camera::new(size[0], size[1], intrinsics.fx_fy_cx_cy, intrinsics.model);
         camera.map_err(|e| DataError::of(e).at(&intrinsics.from))
     }
 
-    fn depth_of(&self, part: &DepthPart, known: &Known, camera: &str, index: usize) -> DataResult<Option<DepthImage>> {
+    fn depth_of(
+        &self,
+        part: &DepthPart,
+        known: &Known,
+        camera: &str,
+        index: usize,
+    ) -> DataResult<Option<DepthImage>> {
         let frames = self.frames_of(camera)?;
         frames.file(index)?;
         let depth = cached(&known.depth, || (part.frames)())?;
@@ -130,7 +139,10 @@ impl Folder {
         let Some(mut doubt) = depth_unit_doubt(image) else { return };
         doubt.about = about;
         let counts = 1.0 / part.metres_per_count;
-        doubt.advice = format!("{counts} counts a metre are read ({}): `depth_scale` in vice.toml says another number", part.from);
+        doubt.advice = format!(
+            "{counts} counts a metre are read ({}): `depth_scale` in vice.toml says another number",
+            part.from
+        );
         self.doubts.lock().unwrap_or_else(PoisonError::into_inner).extend([doubt]);
     }
 }

@@ -96,9 +96,12 @@ pub fn guess(folder: &Path, fps: Option<f64>) -> DataResult<Guess> {
     if guess.layout.is_none() {
         let cameras = camera_folders(folder);
         if cameras.is_empty() {
-            return Err(DataError::of_kind(ErrorKind::Missing, "no PNG or JPEG lies in it or in the folders in it")
-                .at(folder)
-                .hint("give the folder that holds the images, or the folder above it"));
+            return Err(DataError::of_kind(
+                ErrorKind::Missing,
+                "no PNG or JPEG lies in it or in the folders in it",
+            )
+            .at(folder)
+            .hint("give the folder that holds the images, or the folder above it"));
         }
         let depths = depth_folders(folder);
         for place in &cameras {
@@ -142,7 +145,9 @@ impl Guess {
         let mut tried = Vec::new();
         for path in candidates(folder) {
             match CalibrationFile::read(&path) {
-                Ok(file) if file.cameras().values().any(|c| c.intrinsics.is_some()) => tried.push((path, file)),
+                Ok(file) if file.cameras().values().any(|c| c.intrinsics.is_some()) => {
+                    tried.push((path, file))
+                }
                 _ => {}
             }
         }
@@ -160,7 +165,11 @@ impl Guess {
         self.has_extrinsics = file.cameras().values().any(|c| c.body_from_camera.is_some());
         self.found.push(format!("calibration: {}", name(&path)));
         if !others.is_empty() {
-            self.guessed.push(format!("of several calibrations {} is taken, not {}", name(&path), others.join(", ")));
+            self.guessed.push(format!(
+                "of several calibrations {} is taken, not {}",
+                name(&path),
+                others.join(", ")
+            ));
         }
         self.calibration = Some(path);
     }
@@ -168,7 +177,8 @@ impl Guess {
     fn trajectories(&mut self, files: &[PathBuf]) -> Vec<(PathBuf, Trajectory)> {
         let mut read_in = Vec::new();
         for path in files {
-            let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+            let ending =
+                path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
             if !["txt", "csv", "tum", "kitti", "freiburg", "log"].contains(&ending.as_str()) {
                 continue;
             }
@@ -180,7 +190,9 @@ impl Guess {
                     read_in.push((path.clone(), file.trajectory));
                 }
                 Ok(_) => {}
-                Err(error) => self.guessed.push(format!("{} looks like poses, and cannot be read: {error}", name(path))),
+                Err(error) => {
+                    self.guessed.push(format!("{} looks like poses, and cannot be read: {error}", name(path)))
+                }
             }
         }
         let truth: Vec<usize> = (0..read_in.len()).filter(|i| is_truth(&name(&read_in[*i].0))).collect();
@@ -196,7 +208,10 @@ impl Guess {
             self.streams.push((stream, path.clone()));
         }
         if read_in.is_empty() && self.layout.is_none() {
-            self.unknown.push("streams: no file of poses lies in the folder; name them, or give --estimate FILE".to_string());
+            self.unknown.push(
+                "streams: no file of poses lies in the folder; name them, or give --estimate FILE"
+                    .to_string(),
+            );
         }
         read_in
     }
@@ -220,7 +235,9 @@ impl Guess {
                 self.guessed.push(format!("{}: a scan, taken to be in the world of the poses", name(one)));
                 self.cloud = Some(one.clone());
             }
-            _ => self.unknown.push(format!("cloud: {} files are PLY; name the one that is the scan", clouds.len())),
+            _ => self
+                .unknown
+                .push(format!("cloud: {} files are PLY; name the one that is the scan", clouds.len())),
         }
     }
 
@@ -273,11 +290,15 @@ impl Guess {
         });
         // Rooms are some metres deep: of the usual scales the one that makes it so.
         let (scale, why) = match median {
-            Some(counts) if counts > 12_000.0 => (5000.0, "as TUM's: the first depth image would be too far in millimetres"),
+            Some(counts) if counts > 12_000.0 => {
+                (5000.0, "as TUM's: the first depth image would be too far in millimetres")
+            }
             Some(_) => (1000.0, "millimetres"),
             None => (1000.0, "millimetres, though the first depth image cannot be looked at"),
         };
-        let shown = median.map_or_else(String::new, |c| format!(", half of the first is beyond {:.2} m then", f64::from(c) / scale));
+        let shown = median.map_or_else(String::new, |c| {
+            format!(", half of the first is beyond {:.2} m then", f64::from(c) / scale)
+        });
         self.guessed.push(format!("depth_scale = {scale} in {}: {why}{shown}", name(depth)));
         scale
     }
@@ -301,7 +322,9 @@ impl Guess {
         let start = trajectories.first().map(|(_, t)| t.start().to_seconds_text());
         if let Some(fps) = fps {
             if let Some(start) = &start {
-                self.guessed.push(format!("start_s = {start} of {camera}: the first picture is taken at the first pose"));
+                self.guessed.push(format!(
+                    "start_s = {start} of {camera}: the first picture is taken at the first pose"
+                ));
             }
             return When::Fps(fps, start);
         }
@@ -338,7 +361,9 @@ impl Guess {
 fn is_truth(name: &str) -> bool {
     let name = name.to_ascii_lowercase();
     let words: Vec<&str> = name.split(|c: char| !c.is_ascii_alphanumeric()).collect();
-    ["groundtruth", "ground"].iter().any(|w| name.contains(w)) || words.contains(&"gt") || words.contains(&"vicon")
+    ["groundtruth", "ground"].iter().any(|w| name.contains(w))
+        || words.contains(&"gt")
+        || words.contains(&"vicon")
 }
 
 /// The list that is of these pictures: it names one of them, or has a stamp for each.

@@ -68,7 +68,8 @@ impl DatasetFactory for Images {
             return Probe::Yes;
         }
         // A folder of recordings, such as a scene of 7-Scenes or all sequences of KITTI.
-        let inside: Vec<PathBuf> = files::folders(path).into_iter().filter(|p| layout_of(p).is_some()).collect();
+        let inside: Vec<PathBuf> =
+            files::folders(path).into_iter().filter(|p| layout_of(p).is_some()).collect();
         if inside.is_empty() { Probe::No } else { Probe::Collection(inside) }
     }
 

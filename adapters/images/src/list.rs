@@ -95,7 +95,9 @@ impl Columns {
         let mut numbers = (0..file.unwrap_or(row.len())).filter(number);
         let first = numbers.next().or_else(|| (0..row.len()).find(number));
         let Some(first) = first else {
-            return Err(row.error("the row has no stamp").hint("a stamp and a file are expected, such as `12.5 a.png`"));
+            return Err(row
+                .error("the row has no stamp")
+                .hint("a stamp and a file are expected, such as `12.5 a.png`"));
         };
         // `id time file`: a count stands before the time.
         let counts = file == Some(first + 2) && numbers.next() == Some(first + 1);
@@ -148,7 +150,10 @@ mod tests {
         assert_eq!(read(euroc), one(1_403_636_579_763_555_584, "1403636579763555584.png"));
         let uzh = "# id timestamp image_name\n0 1540818801.4321 img/image_0_0.png\n";
         assert_eq!(read(uzh), one(1_540_818_801_432_100_000, "img/image_0_0.png"));
-        assert_eq!(read("0 1540818801.4321 img/image_0_0.png\n"), one(1_540_818_801_432_100_000, "img/image_0_0.png"));
+        assert_eq!(
+            read("0 1540818801.4321 img/image_0_0.png\n"),
+            one(1_540_818_801_432_100_000, "img/image_0_0.png")
+        );
         assert_eq!(read("1.5 b.png 1.6 depth/b.png\n"), one(1_500_000_000, "b.png"));
         assert_eq!(read("a.png 1.5\n"), one(1_500_000_000, "a.png"));
         assert_eq!(read("0.000000e+00\n1.036224e-01\n").unwrap()[1].0, 103_622_400);

@@ -63,8 +63,7 @@ impl Description {
 
     /// Adds what is to be doubted of the whole folder.
     pub(crate) fn doubt(&mut self, code: &str, message: &str, advice: &str) {
-        self.suspicions
-            .push(Suspicion::new(code, self.root.display().to_string(), message).advice(advice));
+        self.suspicions.push(Suspicion::new(code, self.root.display().to_string(), message).advice(advice));
     }
 }
 

@@ -9,7 +9,10 @@ use crate::stamps::ASSUMED_FPS;
 
 /// Keys and what they do.
 pub(crate) const KEYS: [(&str, &str); 2] = [
-    ("fps", "pictures a second, where the pictures are counted and nothing says when they were taken (default 30)"),
+    (
+        "fps",
+        "pictures a second, where the pictures are counted and nothing says when they were taken (default 30)",
+    ),
     ("depth_scale", "counts a metre of the depth images (default: as the layout or vice.toml has it)"),
 ];
 
@@ -28,7 +31,10 @@ impl Settings {
             let Some(text) = options.settings.get(key) else { return Ok(None) };
             match text.parse::<f64>() {
                 Ok(value) if value.is_finite() && value > 0.0 => Ok(Some(value)),
-                _ => Err(DataError::of_kind(ErrorKind::Usage, format!("{key} = {text} is no number above zero"))),
+                _ => Err(DataError::of_kind(
+                    ErrorKind::Usage,
+                    format!("{key} = {text} is no number above zero"),
+                )),
             }
         };
         Ok(Self { fps: number("fps")?, depth_scale: number("depth_scale")?, ..Self::default() })
@@ -58,7 +64,11 @@ impl Settings {
     pub(crate) fn check_used(&self) -> DataResult<()> {
         let unused = [
             ("fps", self.fps.is_some() && !self.fps_used.get(), "the pictures have stamps of their own"),
-            ("depth_scale", self.depth_scale.is_some() && !self.depth_scale_used.get(), "there are no depth images"),
+            (
+                "depth_scale",
+                self.depth_scale.is_some() && !self.depth_scale_used.get(),
+                "there are no depth images",
+            ),
         ];
         match unused.into_iter().find(|(_, unused, _)| *unused) {
             Some((key, _, why)) => {

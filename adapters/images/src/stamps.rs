@@ -124,7 +124,8 @@ pub(crate) fn counted_from(
     let numbers = numbers(&pictures).unwrap_or_else(|| (0..pictures.len() as u64).collect());
     let mut frames = Vec::with_capacity(pictures.len());
     for (number, picture) in numbers.into_iter().zip(pictures) {
-        frames.push((at_index(number.saturating_sub(first), fps, start).map_err(|e| e.at(&picture))?, picture));
+        frames
+            .push((at_index(number.saturating_sub(first), fps, start).map_err(|e| e.at(&picture))?, picture));
     }
     in_order(folder, frames, Vec::new())
 }
@@ -144,9 +145,13 @@ pub(crate) fn at_index(index: u64, fps: f64, start: Stamp) -> DataResult<Stamp> 
 
 /// What is to be said where stamps were made up.
 pub(crate) fn made(folder: &Path, fps: f64) -> Suspicion {
-    Suspicion::new("stamps-made", folder.display().to_string(), "the pictures have no stamps: they are counted")
-        .evidence(format!("one every 1/{fps} s"))
-        .advice("--set fps=... says the rate; what is measured per second or against an IMU depends on it")
+    Suspicion::new(
+        "stamps-made",
+        folder.display().to_string(),
+        "the pictures have no stamps: they are counted",
+    )
+    .evidence(format!("one every 1/{fps} s"))
+    .advice("--set fps=... says the rate; what is measured per second or against an IMU depends on it")
 }
 
 /// Stamps and files of a list. Names of files are relative to one of `roots`, the first that has the first of them; a
@@ -202,21 +207,29 @@ fn named(list: &List, roots: &[&Path], pictures: &[PathBuf]) -> DataResult<Frame
     let about = list.path.display().to_string();
     if missing > 0 && missing < frames.len() as u64 {
         suspicions.push(
-            Suspicion::new("pictures-missing", &about, "pictures that the list names are not there").evidence(
-                format!(
+            Suspicion::new("pictures-missing", &about, "pictures that the list names are not there")
+                .evidence(format!(
                     "{missing} of {}, the first is {}; their stamps are used all the same",
                     frames.len(),
                     first_missing.unwrap_or_default()
-                ),
-            ),
+                )),
         );
     }
     let unlisted: BTreeMap<&PathBuf, ()> =
         there.iter().filter(|(_, seen)| !**seen).map(|(path, _)| (path, ())).collect();
     if let Some((first, ())) = unlisted.first_key_value() {
         suspicions.push(
-            Suspicion::new("pictures-not-listed", &about, "pictures that the list does not name are left out")
-                .evidence(format!("{} of {}, the first is {}", unlisted.len(), pictures.len(), name(first))),
+            Suspicion::new(
+                "pictures-not-listed",
+                &about,
+                "pictures that the list does not name are left out",
+            )
+            .evidence(format!(
+                "{} of {}, the first is {}",
+                unlisted.len(),
+                pictures.len(),
+                name(first)
+            )),
         );
     }
     in_list_order(list, frames, suspicions)

@@ -160,7 +160,10 @@ fn parse(text: &str) -> DataResult<BTreeMap<String, String>> {
         Some(toml::Value::Table(own)) => own,
         Some(_) => return Err(DataError::new(format!("[{TABLE}] is not a table"))),
         // Without a table of its own every plain value is meant for this format.
-        None => table.into_iter().filter(|(key, value)| !value.is_table() && !COMMON.contains(&key.as_str())).collect(),
+        None => table
+            .into_iter()
+            .filter(|(key, value)| !value.is_table() && !COMMON.contains(&key.as_str()))
+            .collect(),
     };
     let mut values = BTreeMap::new();
     for (key, value) in own {
@@ -201,7 +204,10 @@ mod tests {
         assert!(parse("a = [").unwrap_err().to_string().starts_with("line 1: is not TOML"));
         assert!(parse("urdf = [1]").is_err());
         assert!(parse("[euroc]\nx = 1").unwrap().is_empty(), "a table of another format");
-        assert!(parse("calibration = \"c.yaml\"\nfloor = [0, 0, 1, 0]").unwrap().is_empty(), "keys of every format");
+        assert!(
+            parse("calibration = \"c.yaml\"\nfloor = [0, 0, 1, 0]").unwrap().is_empty(),
+            "keys of every format"
+        );
         let set = |key: &str, value: &str| Settings {
             values: [(key.to_string(), value.to_string())].into(),
             folder: PathBuf::new(),

@@ -68,17 +68,40 @@ fn a_plain_folder_gives_the_numbers_of_the_recording_it_was_made_of() {
     let check = vice(&["check", text(&folder)]);
     assert!([0, 3].contains(&check.code), "{}{}", check.stdout, check.stderr);
     let labels = below.path().join("L.csv");
-    let track = ["labels", "track", text(&folder), "--points", "6", "--depth", "zcam", "--duration", "6", "--out", text(&labels)];
+    let track = [
+        "labels",
+        "track",
+        text(&folder),
+        "--points",
+        "6",
+        "--depth",
+        "zcam",
+        "--duration",
+        "6",
+        "--out",
+        text(&labels),
+    ];
     let run = vice(&track);
     assert_eq!(run.code, 0, "{}", run.stderr);
     // No estimate is named: those of the folder are taken.
     let own = json(&["evaluate", text(&folder), "--labels", text(&labels), "--depth", "zcam", "--json", "-"]);
     eprintln!("from a plain folder to the first number: {:.1} s", start.elapsed().as_secs_f64());
-    let theirs = ["evaluate", text(&recording), "--labels", text(&labels), "--depth", "zcam", "--json", "-", "--estimate"];
+    let theirs = [
+        "evaluate",
+        text(&recording),
+        "--labels",
+        text(&labels),
+        "--depth",
+        "zcam",
+        "--json",
+        "-",
+        "--estimate",
+    ];
     let theirs = json(&[&theirs[..], &[text(&folder.join("poses.txt"))]].concat());
     let rmse = |document: &Value, stream: &str| -> Value {
         let parts = document["pixel"].as_array().unwrap();
-        parts.iter().find(|p| p["stream"] == stream).unwrap_or_else(|| panic!("{stream}"))["rmse_2d_px"].clone()
+        parts.iter().find(|p| p["stream"] == stream).unwrap_or_else(|| panic!("{stream}"))["pooled_rmse_px"]
+            .clone()
     };
     assert!(rmse(&own, "poses").to_string().len() > 5, "{own}");
     assert_eq!(rmse(&own, "poses"), rmse(&theirs, "poses"));
@@ -101,7 +124,8 @@ fn labels_without_a_hand_on_a_folder_that_init_described() {
 /// A folder of eight images of 8 x 4 px with stamps in their names, for mistakes.
 fn small(folder: &Path, name: &dyn Fn(usize) -> String) {
     fs::create_dir_all(folder.join("images")).unwrap();
-    let image = vice_core::dataset::Image::new(8, 4, vice_core::dataset::PixelFormat::Gray8, vec![9; 32]).unwrap();
+    let image =
+        vice_core::dataset::Image::new(8, 4, vice_core::dataset::PixelFormat::Gray8, vec![9; 32]).unwrap();
     let png = vice_files::image_file::encode_png(&image).unwrap();
     for i in 0..8 {
         fs::write(folder.join("images").join(name(i)), &png).unwrap();
@@ -118,7 +142,11 @@ fn what_cannot_be_known_is_asked_for_and_a_rate_fills_it_in() {
     let run = vice(&["init", text(folder)]);
     assert!(run.stdout.contains("fps of cam0: nothing says"), "{}", run.stdout);
     let run = vice(&["info", text(folder)]);
-    assert!(run.code == 1 && run.stderr.contains("vice.toml") && run.stderr.contains("fill in fps"), "{}", run.stderr);
+    assert!(
+        run.code == 1 && run.stderr.contains("vice.toml") && run.stderr.contains("fill in fps"),
+        "{}",
+        run.stderr
+    );
     let run = vice(&["info", text(folder), "--set", "fps=10"]);
     assert!(run.stdout.contains("8, 10.0 Hz on average"), "{}{}", run.stdout, run.stderr);
     assert!(run.stdout.contains("cam0: 8x4, pinhole"), "{}", run.stdout);
@@ -126,7 +154,10 @@ fn what_cannot_be_known_is_asked_for_and_a_rate_fills_it_in() {
     let run = vice(&["info", text(folder)]);
     assert!(run.stdout.contains("8, 4.0 Hz on average"), "{}{}", run.stdout, run.stderr);
     let toml = fs::read_to_string(folder.join("vice.toml")).unwrap();
-    assert!(toml.contains("[images.cameras.cam0]") && toml.contains("calibration = \"camchain.yaml\""), "{toml}");
+    assert!(
+        toml.contains("[images.cameras.cam0]") && toml.contains("calibration = \"camchain.yaml\""),
+        "{toml}"
+    );
 }
 
 /// Each mistake is one line with the file, and with what to do.
@@ -139,7 +170,12 @@ fn mistakes_of_a_folder_are_one_line_each() {
     let toml = fs::read_to_string(folder.join("vice.toml")).unwrap();
     let fails = |words: &[&str]| {
         let run = vice(&["floor", "fit", text(folder), "--at", "0"]);
-        let line = run.stderr.lines().find(|l| l.contains("error")).unwrap_or_else(|| panic!("{}", run.stderr)).to_string();
+        let line = run
+            .stderr
+            .lines()
+            .find(|l| l.contains("error"))
+            .unwrap_or_else(|| panic!("{}", run.stderr))
+            .to_string();
         assert!(run.code == 1 || run.code == 2, "{}", run.stderr);
         for word in words {
             assert!(line.contains(word), "{word}: {line}");
@@ -172,7 +208,9 @@ fn mistakes_of_a_folder_are_one_line_each() {
     assert!(run.stderr.contains("times.txt:8: ") && run.stderr.contains("appears twice"), "{}", run.stderr);
     // A depth image of another size.
     fs::create_dir_all(folder.join("depth")).unwrap();
-    let depth = vice_core::dataset::DepthImage::new(vice_core::time::Stamp::default(), 4, 4, vec![1500.0; 16]).unwrap();
+    let depth =
+        vice_core::dataset::DepthImage::new(vice_core::time::Stamp::default(), 4, 4, vec![1500.0; 16])
+            .unwrap();
     let png = vice_files::image_file::encode_depth_png(&depth, 1.0).unwrap();
     for file in files(&folder.join("images")) {
         fs::write(folder.join("depth").join(file.file_name().unwrap()), &png).unwrap();
@@ -199,7 +237,11 @@ fn a_vice_toml_is_honoured_beside_any_format() {
     .unwrap();
     fs::copy(recording.join("labels/board.csv"), folder.join("labels.csv")).unwrap();
     let info = vice(&["info", text(&folder)]);
-    assert!(info.stdout.contains("z + -0.5000 m = 0 in the world") && info.stdout.contains("slam: "), "{}", info.stdout);
+    assert!(
+        info.stdout.contains("z + -0.5000 m = 0 in the world") && info.stdout.contains("slam: "),
+        "{}",
+        info.stdout
+    );
     let run = vice(&["evaluate", text(&folder), "--json", "-"]);
     let document: Value = serde_json::from_str(&run.stdout).unwrap_or_else(|_| panic!("{}", run.stderr));
     assert_eq!(document["used"]["time_offset_s"], 0.25, "{}", document["used"]);

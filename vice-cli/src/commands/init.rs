@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use vice_run::init::{InitRequest, init};
 
-use crate::inputs::{PluginArgs, positive, to_json};
-use crate::terminal::{self, Outcome, Verbosity};
+use crate::inputs::{PluginArgs, positive};
+use crate::outputs::JsonArgs;
+use crate::terminal::{Outcome, Verbosity};
 
 /// Arguments of `vice init`.
 #[derive(Debug, clap::Args)]
@@ -25,9 +26,8 @@ pub(crate) struct Args {
     /// Replace a vice.toml that exists.
     #[arg(long)]
     force: bool,
-    /// Print what was found as JSON, vice.init/1.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    json: JsonArgs,
     #[command(flatten)]
     plugins: PluginArgs,
 }
@@ -40,11 +40,8 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         plugins: args.plugins.spec(),
     };
     let document = init(&request)?;
-    if args.json {
-        terminal::print(&to_json(&document)?)?;
-        return Ok(Outcome::Done);
+    if args.json.put(&[], &document, verbosity, || document.summary())? {
+        verbosity.note(&format!("look at it with `vice info {0}` and `vice check {0}`", args.path.display()));
     }
-    terminal::print(&document.summary())?;
-    verbosity.note(&format!("look at it with `vice info {0}` and `vice check {0}`", args.path.display()));
     Ok(Outcome::Done)
 }

@@ -22,6 +22,7 @@ use vice_core::evaluate::{Observations, Window};
 use vice_core::metrics::align::Alignment;
 use vice_core::time::Span;
 use vice_detect::TagFamily;
+use vice_files::vice_toml::ViceToml;
 
 pub use automatic::{DEFAULT_POINTS, MOST_POINTS, is_auto, labels_shown, points_asked};
 pub use depth_name::{DepthName, ZMapInterpolation};
@@ -287,8 +288,9 @@ impl Request {
         if self.labels.file.as_os_str().is_empty() {
             let told = opened.told.as_ref().map(|told| &told.file.labels);
             let Some((file, points)) = told.and_then(|l| Some((l.file.clone()?, &l.points))) else {
-                return Err(RunError::usage("labels", "no file of labels is named")
-                    .advise("name one, or `auto`; or write it into the data set's vice.toml: [labels] file"));
+                return Err(RunError::usage("labels", "no file of labels is named").advise(
+                    "name one, or `auto`; or write it into the data set's vice.toml: [labels] file",
+                ));
             };
             self.labels.file = file;
             if self.labels.points.is_empty() {
@@ -337,6 +339,7 @@ impl Request {
             files.push(PathBuf::from(name));
         }
         files.extend(self.streams.times.iter().chain(&self.dataset.calibration).cloned());
+        files.extend(beside(&self.dataset.path));
         if let EstimateFrame::File(file) = &self.streams.estimate_frame {
             files.push(file.clone());
         }
@@ -360,6 +363,16 @@ impl Request {
         }
         Ok(())
     }
+}
+
+/// The `vice.toml` of a data set, and what it names.
+fn beside(data_set: &Path) -> Vec<PathBuf> {
+    let Some(file) = ViceToml::place(data_set) else { return Vec::new() };
+    let told = ViceToml::read(&file).unwrap_or_default();
+    let labels = told.labels.file.filter(|file| !is_auto(file));
+    let streams = told.streams.into_values().flat_map(|s| std::iter::once(s.file).chain(s.times));
+    let named = told.calibration.into_iter().chain(told.cloud).chain(labels);
+    std::iter::once(file).chain(named).chain(streams).collect()
 }
 
 impl StreamsSpec {

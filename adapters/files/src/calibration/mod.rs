@@ -215,7 +215,10 @@ impl CalibrationFile {
         match entry.resolution {
             Some([w, h]) if [w, h] != size => Err(DataError::of_kind(
                 ErrorKind::Contradictory,
-                format!("[{name}]: the calibration is of {w}x{h} images, the data set's have {}x{}", size[0], size[1]),
+                format!(
+                    "[{name}]: the calibration is of {w}x{h} images, the data set's have {}x{}",
+                    size[0], size[1]
+                ),
             )
             .at(&self.path)
             .hint("were the images made smaller? Then size and intrinsics are smaller too")),

@@ -72,9 +72,11 @@ impl<R: BufRead> Bytes<R> {
         let count = self.u64()?;
         let rest = self.size.saturating_sub(self.at);
         if count > rest / least {
-            return Err(DataError::new(format!("{count} {what} do not fit into the {rest} bytes that follow"))
-                .byte(at)
-                .hint("the file is cut off, or is no model of COLMAP"));
+            return Err(DataError::new(format!(
+                "{count} {what} do not fit into the {rest} bytes that follow"
+            ))
+            .byte(at)
+            .hint("the file is cut off, or is no model of COLMAP"));
         }
         Ok(count)
     }

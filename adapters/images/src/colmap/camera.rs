@@ -32,7 +32,10 @@ pub(crate) struct ModelCamera {
 pub(super) fn by_number(number: u32) -> DataResult<(&'static str, usize)> {
     let found = usize::try_from(number).ok().and_then(|n| MODELS.get(n));
     found.copied().ok_or_else(|| {
-        DataError::of_kind(ErrorKind::Unsupported, format!("there is no camera model with the number {number}"))
+        DataError::of_kind(
+            ErrorKind::Unsupported,
+            format!("there is no camera model with the number {number}"),
+        )
     })
 }
 
@@ -47,7 +50,11 @@ pub(super) fn by_name(name: &str) -> DataResult<(&'static str, usize)> {
 
 impl ModelCamera {
     /// Checks the numbers as far as they say something by themselves.
-    pub(super) fn new(model: (&'static str, usize), size: [u64; 2], parameters: Vec<f64>) -> DataResult<Self> {
+    pub(super) fn new(
+        model: (&'static str, usize),
+        size: [u64; 2],
+        parameters: Vec<f64>,
+    ) -> DataResult<Self> {
         let (model, count) = model;
         if parameters.len() != count {
             return Err(DataError::new(format!(
@@ -56,7 +63,8 @@ impl ModelCamera {
             )));
         }
         let side = |side: u64| {
-            let found = u32::try_from(side).ok().filter(|s| (1..=vice_files::image_file::MAX_SIDE_PX).contains(s));
+            let found =
+                u32::try_from(side).ok().filter(|s| (1..=vice_files::image_file::MAX_SIDE_PX).contains(s));
             found.ok_or_else(|| DataError::new(format!("{side} is no side of an image in pixels")))
         };
         Ok(Self { model, size: [side(size[0])?, side(size[1])?], parameters })

@@ -70,7 +70,12 @@ impl SparseModel {
         if let Some(lost) = images.iter().find(|i| !cameras.contains_key(&i.camera)) {
             return Err(DataError::of_kind(
                 ErrorKind::Contradictory,
-                format!("{} is of camera {}, which {} does not have", lost.name, lost.camera, cameras_file.display()),
+                format!(
+                    "{} is of camera {}, which {} does not have",
+                    lost.name,
+                    lost.camera,
+                    cameras_file.display()
+                ),
             )
             .at(images_file));
         }

@@ -26,7 +26,9 @@ fn lines(path: &Path, mut work: impl FnMut(u64, &str) -> DataResult<()>) -> Data
     loop {
         text.clear();
         line += 1;
-        let read = reader.read_line(&mut text).map_err(|e| DataError::new("cannot be read as text").line(line).because(e))?;
+        let read = reader
+            .read_line(&mut text)
+            .map_err(|e| DataError::new("cannot be read as text").line(line).because(e))?;
         if read == 0 {
             return Ok(());
         }

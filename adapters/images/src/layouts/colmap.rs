@@ -25,10 +25,14 @@ use crate::stamps;
 pub(crate) const LAYOUT: Layout = Layout { name: "COLMAP", is, describe };
 
 /// Where a model lies below a folder.
-const PLACES: [&str; 8] = ["", "sparse/0", "sparse", "model", "colmap/sparse/0", "colmap", "dslr_calibration_undistorted", "0"];
+const PLACES: [&str; 8] =
+    ["", "sparse/0", "sparse", "model", "colmap/sparse/0", "colmap", "dslr_calibration_undistorted", "0"];
 
 fn model_of(folder: &Path) -> Option<PathBuf> {
-    PLACES.iter().map(|p| if p.is_empty() { folder.to_path_buf() } else { folder.join(p) }).find(|p| is_model(p))
+    PLACES
+        .iter()
+        .map(|p| if p.is_empty() { folder.to_path_buf() } else { folder.join(p) })
+        .find(|p| is_model(p))
 }
 
 fn is(folder: &Path) -> bool {
@@ -37,7 +41,8 @@ fn is(folder: &Path) -> bool {
 
 /// The folder that the names of the images start from: the first that has one of them.
 fn pictures_of(folder: &Path, model: &SparseModel) -> Option<PathBuf> {
-    let mut places: Vec<PathBuf> = ["images", "rgb", "image", "input"].iter().map(|p| folder.join(p)).collect();
+    let mut places: Vec<PathBuf> =
+        ["images", "rgb", "image", "input"].iter().map(|p| folder.join(p)).collect();
     places.push(folder.to_path_buf());
     places.extend(folders(folder));
     // A model that was opened by itself has its images beside its folder, or two above.
@@ -105,7 +110,8 @@ fn describe(folder: &Path, settings: &Settings) -> DataResult<Description> {
     // Which cameras there are must be known.
     let known = shared.get()?;
     let ids: Vec<u32> = known.by_camera.keys().copied().collect();
-    let first = *ids.first().ok_or_else(|| DataError::of_kind(ErrorKind::Missing, "has no camera").at(&at))?;
+    let first =
+        *ids.first().ok_or_else(|| DataError::of_kind(ErrorKind::Missing, "has no camera").at(&at))?;
     if ids.len() > 1 && ids.len() >= known.model.images.len() / 2 {
         found.doubt(
             "a-camera-an-image",
@@ -166,7 +172,9 @@ fn beside(shared: Arc<Shared<Reconstruction>>, first: u32, id: u32) -> At {
             found.map(|i| frames[i].2).ok_or_else(|| {
                 DataError::of_kind(
                     ErrorKind::Missing,
-                    format!("the model has no image of camera {camera} at {stamp} ns to place camera {id} by"),
+                    format!(
+                        "the model has no image of camera {camera} at {stamp} ns to place camera {id} by"
+                    ),
                 )
                 .at(&known.model.folder)
             })

@@ -97,20 +97,28 @@ fn is(folder: &Path) -> bool {
 fn describe(folder: &Path, settings: &Settings) -> DataResult<Description> {
     let mut found = Description::new(LAYOUT.name, folder);
     let path = folder.join(vice_toml::FILE);
-    let text = std::fs::read_to_string(&path).map_err(|e| DataError::new("cannot be read").at(&path).because(e))?;
+    let text =
+        std::fs::read_to_string(&path).map_err(|e| DataError::new("cannot be read").at(&path).because(e))?;
     let file: File = from_toml(&text).map_err(|e| e.at(&path))?;
     let table = file.images.ok_or_else(|| DataError::new("has no table [images]").at(&path))?;
     let mut cameras: Vec<(String, CameraTable)> = table.cameras.into_iter().collect();
     cameras.sort_by(|a, b| natural(&a.0, &b.0));
     if cameras.is_empty() {
-        return Err(DataError::of_kind(ErrorKind::Missing, "names no camera").at(&path).hint("[images.cameras.cam0] describes one"));
+        return Err(DataError::of_kind(ErrorKind::Missing, "names no camera")
+            .at(&path)
+            .hint("[images.cameras.cam0] describes one"));
     }
     for (name, camera) in cameras {
         let part = camera_part(folder, &name, &camera, settings);
-        found.cameras.push(part.map_err(|e| DataError::of_kind(e.kind(), format!("[images.cameras.{name}]: {}", e.problem())).hint(e.hint_text().unwrap_or_default().to_string()).at(&path))?);
+        found.cameras.push(part.map_err(|e| {
+            DataError::of_kind(e.kind(), format!("[images.cameras.{name}]: {}", e.problem()))
+                .hint(e.hint_text().unwrap_or_default().to_string())
+                .at(&path)
+        })?);
     }
     if let Some(imu) = table.imu {
-        let imu = paths::safe_join(folder, &imu).map_err(|e| DataError::new(format!("imu: {}", e.problem())).at(&path))?;
+        let imu = paths::safe_join(folder, &imu)
+            .map_err(|e| DataError::new(format!("imu: {}", e.problem())).at(&path))?;
         found.imu = Some(Box::new(move || {
             let file = imu_file::read(&imu)?;
             Ok(Samples { samples: file.samples.into(), suspicions: file.suspicions.into_iter().collect() })
@@ -123,19 +131,35 @@ fn describe(folder: &Path, settings: &Settings) -> DataResult<Description> {
     Ok(found)
 }
 
-fn camera_part(folder: &Path, name: &str, table: &CameraTable, settings: &Settings) -> DataResult<CameraPart> {
+fn camera_part(
+    folder: &Path,
+    name: &str,
+    table: &CameraTable,
+    settings: &Settings,
+) -> DataResult<CameraPart> {
     let below = |file: &str| paths::safe_join(folder, file);
-    let inside = if matches!(table.folder.as_str(), "." | "") { folder.to_path_buf() } else { below(&table.folder)? };
+    let inside =
+        if matches!(table.folder.as_str(), "." | "") { folder.to_path_buf() } else { below(&table.folder)? };
     if !inside.is_dir() {
-        return Err(DataError::of_kind(ErrorKind::Missing, format!("there is no folder {}", inside.display())));
+        return Err(DataError::of_kind(
+            ErrorKind::Missing,
+            format!("there is no folder {}", inside.display()),
+        ));
     }
-    let ways = [table.names.is_some(), table.list.is_some(), table.fps.is_some()].iter().filter(|w| **w).count();
+    let ways =
+        [table.names.is_some(), table.list.is_some(), table.fps.is_some()].iter().filter(|w| **w).count();
     if ways > 1 {
-        return Err(DataError::of_kind(ErrorKind::Contradictory, "of names, list and fps more than one is given")
-            .hint("the stamps come from one of them"));
+        return Err(DataError::of_kind(
+            ErrorKind::Contradictory,
+            "of names, list and fps more than one is given",
+        )
+        .hint("the stamps come from one of them"));
     }
     if table.start_s.is_some() && (table.names.is_some() || table.list.is_some()) {
-        return Err(DataError::of_kind(ErrorKind::Contradictory, "start_s is of counted pictures, and these have stamps"));
+        return Err(DataError::of_kind(
+            ErrorKind::Contradictory,
+            "start_s is of counted pictures, and these have stamps",
+        ));
     }
     let start = match &table.start_s {
         Some(start) => start.stamp().map_err(|e| DataError::new(format!("start_s: {e}")))?,
@@ -167,7 +191,10 @@ fn camera_part(folder: &Path, name: &str, table: &CameraTable, settings: &Settin
             })
         }
         None if table.depth_scale.is_some() || table.depth_list.is_some() => {
-            return Err(DataError::of_kind(ErrorKind::Contradictory, "depth_scale and depth_list are of depth images, and none are named"));
+            return Err(DataError::of_kind(
+                ErrorKind::Contradictory,
+                "depth_scale and depth_list are of depth images, and none are named",
+            ));
         }
         None => None,
     };
@@ -207,7 +234,9 @@ fn frames(folder: &Path, inside: &Path, when: &When) -> Read<Frames> {
             }
             (None, Some(unit), _) => stamps::by_names(&inside, there, unit),
             (None, None, Some(fps)) => stamps::by_index(&inside, there, fps, when.start),
-            (None, None, None) => Err(DataError::new("nothing says when the pictures were taken").at(&inside)),
+            (None, None, None) => {
+                Err(DataError::new("nothing says when the pictures were taken").at(&inside))
+            }
         }
     })
 }
@@ -232,15 +261,20 @@ fn depth_frames(
         // By the name where the names are the same, else one after the other.
         let by_name: BTreeMap<String, &PathBuf> = there.iter().map(|p| (crate::files::stem(p), p)).collect();
         let same = colour.files.iter().zip(colour.stamps.iter());
-        let same: Vec<(Stamp, PathBuf)> =
-            same.filter_map(|(f, s)| by_name.get(&crate::files::stem(f)).map(|d| (*s, (*d).clone()))).collect();
+        let same: Vec<(Stamp, PathBuf)> = same
+            .filter_map(|(f, s)| by_name.get(&crate::files::stem(f)).map(|d| (*s, (*d).clone())))
+            .collect();
         if !same.is_empty() {
             return stamps::in_order(&depth, same, Vec::new());
         }
         if there.len() != colour.files.len() {
             return Err(DataError::of_kind(
                 ErrorKind::Contradictory,
-                format!("{} depth images for {} pictures, and no names that are the same", there.len(), colour.files.len()),
+                format!(
+                    "{} depth images for {} pictures, and no names that are the same",
+                    there.len(),
+                    colour.files.len()
+                ),
             )
             .at(&depth)
             .hint("`depth_list` in vice.toml names a list of stamps and files"));

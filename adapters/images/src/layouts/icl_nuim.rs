@@ -42,7 +42,10 @@ fn describe(folder: &Path, settings: &Settings) -> DataResult<Description> {
         frames: numbered(&folder.join("rgb"), fps),
         intrinsics: Box::new(|| {
             let from = "the authors' page (fy without its sign)";
-            Ok(Intrinsics { size: Some([640, 480]), ..Intrinsics::pinhole([481.20, 480.00, 319.50, 239.50], from) })
+            Ok(Intrinsics {
+                size: Some([640, 480]),
+                ..Intrinsics::pinhole([481.20, 480.00, 319.50, 239.50], from)
+            })
         }),
         place: Place::body(),
         depth: depth.then(|| {
@@ -56,7 +59,9 @@ fn describe(folder: &Path, settings: &Settings) -> DataResult<Description> {
         found.streams.push(StreamPart { name: vice_core::dataset::GROUND_TRUTH.to_string(), read });
     }
     found.fact(format!("frames are numbers, taken at {fps} Hz"));
-    found.fact("fy is -480 in the data: the camera's y is mirrored, and the left-handed world with it; z is up");
+    found.fact(
+        "fy is -480 in the data: the camera's y is mirrored, and the left-handed world with it; z is up",
+    );
     found.floor = vice_core::dataset::Floor::Unknown;
     Ok(found)
 }
@@ -69,7 +74,9 @@ fn numbered(folder: &Path, fps: f64) -> Read<Frames> {
         for picture in pictures(&folder)? {
             let stem = stem(&picture);
             let number = number_in(&stem).and_then(|n| n.parse::<u64>().ok()).ok_or_else(|| {
-                DataError::new("the name is no number of a frame").at(&picture).hint("names such as 0.png are expected")
+                DataError::new("the name is no number of a frame")
+                    .at(&picture)
+                    .hint("names such as 0.png are expected")
             })?;
             frames.push((at_index(number, fps, Stamp::default())?, picture));
         }
@@ -94,9 +101,7 @@ fn poses(path: &Path, fps: f64) -> DataResult<Poses> {
 fn mirrored(pose: &WorldFromBody) -> WorldFromBody {
     let (t, q) = (pose.translation(), pose.rotation());
     // A rotation vector is axial: the mirror in y turns its x and z around and leaves y.
-    let rotation = UnitQuaternion::new_unchecked(Quaternion::new(
-        q.w, -q.i, q.j, -q.k,
-    ));
+    let rotation = UnitQuaternion::new_unchecked(Quaternion::new(q.w, -q.i, q.j, -q.k));
     Rigid::from_parts(Vector3::new(t.x, -t.y, t.z), rotation)
 }
 

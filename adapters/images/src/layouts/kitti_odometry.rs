@@ -24,7 +24,8 @@ use crate::stamps;
 pub(crate) const LAYOUT: Layout = Layout { name: "KITTI odometry", is, describe };
 
 /// Cameras, and their lines in the calibration.
-const CAMERAS: [(&str, &str); 4] = [("image_0", "P0"), ("image_1", "P1"), ("image_2", "P2"), ("image_3", "P3")];
+const CAMERAS: [(&str, &str); 4] =
+    [("image_0", "P0"), ("image_1", "P1"), ("image_2", "P2"), ("image_3", "P3")];
 
 fn is(folder: &Path) -> bool {
     folder.join("calib.txt").is_file() && CAMERAS.iter().any(|(camera, _)| has_picture(&folder.join(camera)))
@@ -36,7 +37,11 @@ fn poses_of(folder: &Path) -> Option<PathBuf> {
     let own = format!("{}.txt", name(&real));
     let above = real.parent().and_then(Path::parent).map(|p| p.join("poses").join(&own));
     let inside = ["poses.txt", "gt.txt"].map(|p| folder.join(p));
-    above.into_iter().chain([folder.join(&own), folder.join("poses").join(&own)]).chain(inside).find(|p| p.is_file())
+    above
+        .into_iter()
+        .chain([folder.join(&own), folder.join("poses").join(&own)])
+        .chain(inside)
+        .find(|p| p.is_file())
 }
 
 fn describe(folder: &Path, settings: &Settings) -> DataResult<Description> {
@@ -60,7 +65,9 @@ fn describe(folder: &Path, settings: &Settings) -> DataResult<Description> {
             }),
             intrinsics: Box::new(move || Ok(own.get()?.projection(key)?.0)),
             // The body is the first camera.
-            place: Place::Fixed(Box::new(move || Ok(place.get()?.projection(key)?.1.reinterpret())) as Read<BodyFromCamera>),
+            place: Place::Fixed(
+                Box::new(move || Ok(place.get()?.projection(key)?.1.reinterpret())) as Read<BodyFromCamera>
+            ),
             depth: None,
         });
     }

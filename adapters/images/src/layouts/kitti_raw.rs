@@ -37,7 +37,9 @@ fn of_day(folder: &Path, file: &str) -> Option<PathBuf> {
 
 /// The first rectified camera in the body: through the laser scanner, where the files are there.
 fn body_from_first(folder: &Path, cameras: &Lines) -> DataResult<Option<Rigid<Body, FirstCamera>>> {
-    let (Some(imu), Some(velo)) = (of_day(folder, "calib_imu_to_velo.txt"), of_day(folder, "calib_velo_to_cam.txt")) else {
+    let (Some(imu), Some(velo)) =
+        (of_day(folder, "calib_imu_to_velo.txt"), of_day(folder, "calib_velo_to_cam.txt"))
+    else {
         return Ok(None);
     };
     let velo_from_body: Rigid<Cloud, Body> = Lines::read(&imu)?.rigid("R", "T")?;
@@ -57,9 +59,8 @@ fn camera(folder: &Path, lines: &Lines, number: &str) -> DataResult<(Intrinsics,
 
 fn describe(folder: &Path, _: &Settings) -> DataResult<Description> {
     let mut found = Description::new(LAYOUT.name, folder);
-    let file = of_day(folder, "calib_cam_to_cam.txt").unwrap_or_else(|| {
-        folder.parent().unwrap_or(folder).join("calib_cam_to_cam.txt")
-    });
+    let file = of_day(folder, "calib_cam_to_cam.txt")
+        .unwrap_or_else(|| folder.parent().unwrap_or(folder).join("calib_cam_to_cam.txt"));
     for number in CAMERAS {
         let inside = folder.join(format!("image_{number}"));
         if !has_picture(&inside.join("data")) {

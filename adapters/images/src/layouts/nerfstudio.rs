@@ -31,8 +31,22 @@ const FILE: &str = "transforms.json";
 const DEPTH_UNIT: f64 = 1e-3;
 /// Keys of intrinsics, also of single frames.
 const INTRINSICS: [&str; 16] = [
-    "fl_x", "fl_y", "cx", "cy", "w", "h", "k1", "k2", "k3", "k4", "p1", "p2", "camera_angle_x", "camera_angle_y",
-    "camera_model", "is_fisheye",
+    "fl_x",
+    "fl_y",
+    "cx",
+    "cy",
+    "w",
+    "h",
+    "k1",
+    "k2",
+    "k3",
+    "k4",
+    "p1",
+    "p2",
+    "camera_angle_x",
+    "camera_angle_y",
+    "camera_model",
+    "is_fisheye",
 ];
 
 fn is(folder: &Path) -> bool {
@@ -70,14 +84,17 @@ struct Scene {
 
 fn read(folder: &Path) -> DataResult<Scene> {
     let path = folder.join(FILE);
-    let text = std::fs::read_to_string(&path).map_err(|e| DataError::new("cannot be read").at(&path).because(e))?;
+    let text =
+        std::fs::read_to_string(&path).map_err(|e| DataError::new("cannot be read").at(&path).because(e))?;
     let file: File = serde_json::from_str(&text).map_err(|e| {
         DataError::new(format!("is not what nerfstudio writes: {e}")).at(&path).line(e.line() as u64)
     })?;
     one_camera(&file).map_err(|e| e.at(&path))?;
     let mut frames = Vec::with_capacity(file.frames.len());
     for (index, frame) in file.frames.iter().enumerate() {
-        let wrong = |problem: String| DataError::new(format!("frame {index}, {}: {problem}", frame.file_path)).at(&path);
+        let wrong = |problem: String| {
+            DataError::new(format!("frame {index}, {}: {problem}", frame.file_path)).at(&path)
+        };
         let below = |file: &str| {
             let file = file.strip_prefix("./").unwrap_or(file);
             paths::safe_join(folder, file).map_err(|e| wrong(e.problem().to_string()))
@@ -223,7 +240,9 @@ fn describe(folder: &Path, settings: &Settings) -> DataResult<Description> {
     };
     let depth = if has_depth {
         if !(unit.is_finite() && unit > 0.0) {
-            return Err(DataError::new(format!("depth_unit_scale_factor = {unit} is not positive")).at(&known.path));
+            return Err(
+                DataError::new(format!("depth_unit_scale_factor = {unit} is not positive")).at(&known.path)
+            );
         }
         let (metres_per_count, from) = settings.metres_per_count(1.0 / unit, FILE);
         let (own, colour) = (scene.clone(), pictures(&scene, folder));
@@ -262,10 +281,16 @@ fn describe(folder: &Path, settings: &Settings) -> DataResult<Description> {
         let path = paths::safe_join(folder, ply.strip_prefix("./").unwrap_or(&ply))
             .map_err(|e| DataError::new(format!("ply_file_path: {}", e.problem())).at(&known.path))?;
         found.cloud = Some(Box::new(move || {
-            Ok(CloudRef { source: CloudSource::Ply(path.clone()), world_from_cloud: Rigid::<World, _>::identity() })
+            Ok(CloudRef {
+                source: CloudSource::Ply(path.clone()),
+                world_from_cloud: Rigid::<World, _>::identity(),
+            })
         }));
     }
-    found.fact(format!("{}: poses of the camera, which is the body; frames are counted at {fps} Hz", name(&known.path)));
+    found.fact(format!(
+        "{}: poses of the camera, which is the body; frames are counted at {fps} Hz",
+        name(&known.path)
+    ));
     if known.file.applied_transform.is_some() || known.file.applied_scale.is_some_and(|s| s != 1.0) {
         found.fact("the file says that its world was moved or scaled: distances may not be metres");
     }

@@ -41,15 +41,17 @@ fn packets(folder: &Path) -> DataResult<Vec<Packet>> {
     }
     let mut packets = Vec::with_capacity(files.len());
     for (row, path) in list.rows.iter().zip(files) {
-        let text =
-            std::fs::read_to_string(&path).map_err(|e| DataError::new("cannot be read").at(&path).because(e))?;
+        let text = std::fs::read_to_string(&path)
+            .map_err(|e| DataError::new("cannot be read").at(&path).because(e))?;
         let v: Result<Vec<f64>, _> = text.split_whitespace().map(str::parse::<f64>).collect();
         let v = v.map_err(|e| DataError::new("holds what is no number").at(&path).because(e))?;
         if v.len() < 25 || v[..25].iter().any(|n| !n.is_finite()) {
             return Err(DataError::new(format!("{} numbers, where a packet has 30", v.len())).at(&path));
         }
         if v[0].abs() >= 90.0 || v[1].abs() > 180.0 {
-            return Err(DataError::new(format!("latitude {} and longitude {} are no place", v[0], v[1])).at(&path));
+            return Err(
+                DataError::new(format!("latitude {} and longitude {} are no place", v[0], v[1])).at(&path)
+            );
         }
         packets.push(Packet { stamp: row.stamp, path, v });
     }
@@ -70,8 +72,11 @@ pub(crate) fn poses(folder: &Path) -> DataResult<Poses> {
     let mut previous: Option<Stamp> = None;
     for packet in &packets {
         if previous.is_some_and(|p| p >= packet.stamp) {
-            return Err(DataError::new(format!("its stamp, {} ns, is not later than the one before", packet.stamp))
-                .at(&packet.path));
+            return Err(DataError::new(format!(
+                "its stamp, {} ns, is not later than the one before",
+                packet.stamp
+            ))
+            .at(&packet.path));
         }
         previous = Some(packet.stamp);
         let rotation = UnitQuaternion::from_euler_angles(packet.v[3], packet.v[4], packet.v[5]);

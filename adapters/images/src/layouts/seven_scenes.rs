@@ -56,7 +56,9 @@ fn describe(folder: &Path, settings: &Settings) -> DataResult<Description> {
         }),
     });
     let path = folder.to_path_buf();
-    found.streams.push(StreamPart { name: GROUND_TRUTH.to_string(), read: Box::new(move || poses(&path, fps)) });
+    found
+        .streams
+        .push(StreamPart { name: GROUND_TRUTH.to_string(), read: Box::new(move || poses(&path, fps)) });
     if calibration::in_folder(folder).is_none() {
         found.doubt(
             "not-calibrated",
@@ -64,7 +66,9 @@ fn describe(folder: &Path, settings: &Settings) -> DataResult<Description> {
             "--calibration replaces them; colour is nearer to 525 px",
         );
     }
-    found.fact("poses are those of the camera, by KinectFusion: it is the body, and which way is up is not known");
+    found.fact(
+        "poses are those of the camera, by KinectFusion: it is the body, and which way is up is not known",
+    );
     found.floor = Floor::Unknown;
     Ok(found)
 }
@@ -88,7 +92,9 @@ fn poses(folder: &Path, fps: f64) -> DataResult<Poses> {
     let (mut poses, mut none, mut first) = (Vec::new(), 0, String::new());
     for (number, path) in with_ending(folder, ".pose.txt")? {
         match pose(&path)? {
-            Some(pose) => poses.push((at_index(number, fps, Stamp::default()).map_err(|e| e.at(&path))?, pose)),
+            Some(pose) => {
+                poses.push((at_index(number, fps, Stamp::default()).map_err(|e| e.at(&path))?, pose))
+            }
             None => {
                 if none == 0 {
                     first = name(&path);
@@ -102,7 +108,8 @@ fn poses(folder: &Path, fps: f64) -> DataResult<Poses> {
 
 /// A pose; `None` where tracking was lost and the file says so by numbers that are none.
 fn pose(path: &Path) -> DataResult<Option<WorldFromBody>> {
-    let text = std::fs::read_to_string(path).map_err(|e| DataError::new("cannot be read").at(path).because(e))?;
+    let text =
+        std::fs::read_to_string(path).map_err(|e| DataError::new("cannot be read").at(path).because(e))?;
     let mut numbers = Vec::new();
     for (line, row) in (1..).zip(text.lines()) {
         for word in row.split_whitespace() {

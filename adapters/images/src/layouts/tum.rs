@@ -32,7 +32,8 @@ const PUBLISHED: [(&str, [f64; 4], [f64; 5]); 3] = [
 ];
 
 fn is(folder: &Path) -> bool {
-    folder.join("rgb.txt").is_file() && (has_picture(&folder.join("rgb")) || folder.join("depth.txt").is_file())
+    folder.join("rgb.txt").is_file()
+        && (has_picture(&folder.join("rgb")) || folder.join("depth.txt").is_file())
 }
 
 fn describe(folder: &Path, settings: &Settings) -> DataResult<Description> {
@@ -75,7 +76,9 @@ fn intrinsics(folder: &Path, name: &str) -> Read<Intrinsics> {
             return Ok(calibration::of_file(&file, "rgb", &["rgb".to_string()])?.0);
         }
         let is = |number: &str| {
-            [format!("freiburg{number}"), format!("fr{number}")].iter().any(|word| lower.contains(word.as_str()))
+            [format!("freiburg{number}"), format!("fr{number}")]
+                .iter()
+                .any(|word| lower.contains(word.as_str()))
         };
         let Some((number, fx_fy_cx_cy, distortion)) = PUBLISHED.into_iter().find(|(n, _, _)| is(n)) else {
             return Err(calibration::missing(
@@ -84,7 +87,8 @@ fn intrinsics(folder: &Path, name: &str) -> Read<Intrinsics> {
             ));
         };
         let from = format!("the authors' page, for freiburg{number}");
-        let model = if distortion == [0.0; 5] { Ok(Model::Pinhole) } else { Model::from_name("radtan", &distortion) };
+        let model =
+            if distortion == [0.0; 5] { Ok(Model::Pinhole) } else { Model::from_name("radtan", &distortion) };
         let model = model.map_err(DataError::of)?;
         Ok(Intrinsics { size: Some([640, 480]), model, ..Intrinsics::pinhole(fx_fy_cx_cy, from) })
     })

@@ -27,15 +27,20 @@ fn is(folder: &Path) -> bool {
 }
 
 fn camchain(folder: &Path) -> Option<PathBuf> {
-    ["dso/camchain.yaml", "camchain.yaml", "mav0/camchain.yaml"].iter().map(|p| folder.join(p)).find(|p| p.is_file())
+    ["dso/camchain.yaml", "camchain.yaml", "mav0/camchain.yaml"]
+        .iter()
+        .map(|p| folder.join(p))
+        .find(|p| p.is_file())
 }
 
 fn describe(folder: &Path, _: &Settings) -> DataResult<Description> {
     let mut found = Description::new(LAYOUT.name, folder);
     let mav = folder.join("mav0");
     let chain = camchain(folder).unwrap_or_else(|| folder.join("dso/camchain.yaml"));
-    let cameras: Vec<PathBuf> =
-        folders(&mav).into_iter().filter(|p| name(p).starts_with("cam") && p.join("data.csv").is_file()).collect();
+    let cameras: Vec<PathBuf> = folders(&mav)
+        .into_iter()
+        .filter(|p| name(p).starts_with("cam") && p.join("data.csv").is_file())
+        .collect();
     let names: Vec<String> = cameras.iter().map(|p| name(p)).collect();
     for (path, camera) in cameras.iter().zip(&names) {
         let (file, own, all) = (chain.clone(), camera.clone(), names.clone());

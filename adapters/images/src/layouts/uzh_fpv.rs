@@ -24,7 +24,8 @@ use crate::settings::Settings;
 pub(crate) const LAYOUT: Layout = Layout { name: "UZH-FPV", is, describe };
 
 /// Lists of the cameras, and what the camchain calls them.
-const LISTS: [(&str, &str); 3] = [("left_images.txt", "cam0"), ("right_images.txt", "cam1"), ("images.txt", "cam0")];
+const LISTS: [(&str, &str); 3] =
+    [("left_images.txt", "cam0"), ("right_images.txt", "cam1"), ("images.txt", "cam0")];
 
 fn is(folder: &Path) -> bool {
     folder.join("img").is_dir() && LISTS.iter().any(|(list, _)| folder.join(list).is_file())
@@ -49,7 +50,8 @@ fn camchain(folder: &Path) -> Option<PathBuf> {
 fn describe(folder: &Path, _: &Settings) -> DataResult<Description> {
     let mut found = Description::new(LAYOUT.name, folder);
     let chain = camchain(folder);
-    let lists: Vec<(&str, &str)> = LISTS.into_iter().filter(|(list, _)| folder.join(list).is_file()).collect();
+    let lists: Vec<(&str, &str)> =
+        LISTS.into_iter().filter(|(list, _)| folder.join(list).is_file()).collect();
     let names: Vec<String> = lists.iter().map(|(_, camera)| (*camera).to_string()).collect();
     for (list, camera) in lists {
         let (file, root, all) = (chain.clone(), folder.to_path_buf(), names.clone());
