@@ -5,6 +5,7 @@
 #![allow(clippy::expect_used, clippy::panic, clippy::print_stderr)] // A test helper fails its test.
 
 pub mod flawed;
+pub mod layouts;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

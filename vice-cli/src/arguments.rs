@@ -48,6 +48,8 @@ pub(crate) enum Command {
     Trajectory(commands::trajectory::Args),
     /// Label key points in the browser, by hand and with a tracker.
     Annotate(Box<commands::annotate::Args>),
+    /// Write a vice.toml for a folder of images, or beside any data set: what it holds, and what cannot be known.
+    Init(commands::init::Args),
     /// Show what a data set holds.
     Info(commands::info::Args),
     /// List the data set formats, built in and of plugins.
@@ -107,8 +109,10 @@ mod tests {
             let words = [&alone[..], extra].concat();
             assert_eq!(parse(&words), Err(clap::error::ErrorKind::ArgumentConflict), "{extra:?}");
         }
-        let missing = parse(&["vice", "evaluate", "run", "--labels", "l.csv"]);
+        let missing = parse(&["vice", "evaluate"]);
         assert_eq!(missing, Err(clap::error::ErrorKind::MissingRequiredArgument));
+        // What is not named the data set may say, by its streams or its vice.toml.
+        assert_eq!(parse(&["vice", "evaluate", "run"]), Ok(()));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 
 use crate::inputs::write_text;
-use crate::terminal::{self, usage};
+use crate::terminal::{self, Verbosity, usage};
 
 /// The name that stands for standard output.
 const STDOUT: &str = "-";
@@ -70,6 +70,34 @@ impl Outputs {
             }
         }
         Ok(printed)
+    }
+}
+
+/// A document beside what is printed, for commands that write nothing else.
+#[derive(Clone, Debug, clap::Args)]
+pub(crate) struct JsonArgs {
+    /// Document as JSON; - or no name prints it in place of the text.
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-", help_heading = "Output")]
+    pub(crate) json: Option<PathBuf>,
+}
+
+impl JsonArgs {
+    /// Writes the document where it is asked for, and prints the text; true if the text was printed.
+    pub(crate) fn put(
+        &self,
+        inputs: &[PathBuf],
+        document: &impl serde::Serialize,
+        verbosity: Verbosity,
+        text: impl FnOnce() -> String,
+    ) -> anyhow::Result<bool> {
+        if let Some(path) = &self.json {
+            let outputs = Outputs::new(&[&self.json], inputs)?;
+            if outputs.write_json(path, document)? || verbosity.is_quiet() {
+                return Ok(false);
+            }
+        }
+        terminal::print(&text())?;
+        Ok(true)
     }
 }
 

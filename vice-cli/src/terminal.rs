@@ -79,6 +79,11 @@ impl Verbosity {
         .with_message("0")
     }
 
+    /// Whether only errors and results are said.
+    pub(crate) const fn is_quiet(self) -> bool {
+        self.quiet
+    }
+
     /// A remark that is neither a result nor a warning.
     pub(crate) fn note(self, text: &str) {
         if !self.quiet {

@@ -11,7 +11,7 @@ use parry3d::shape::HalfSpace;
 use vice_core::camera::Pixel;
 use vice_core::dataset::{Floor, Plane};
 use vice_core::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
-use vice_core::error::DataResult;
+use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::frames::{Camera, World};
 
 /// Sine of the angle to the plane below which a ray counts as running along the horizon.
@@ -101,6 +101,13 @@ impl DepthSource for FloorDepth {
         keyframe: &Keyframe<'_>,
         pixels: &[Pixel],
     ) -> DataResult<Vec<Result<DepthSample, DepthMiss>>> {
+        if self.plane.is_none() && keyframe.floor == Floor::Unknown {
+            return Err(DataError::of_kind(
+                ErrorKind::Missing,
+                "no floor is known: nothing says which way is up or how high the cameras are",
+            )
+            .hint("give `floor-plane`, which `vice floor fit` finds in a scan or a depth image, or ask another `depth`"));
+        }
         let plane = self.in_camera(keyframe);
         let depth = |pixel: &Pixel| {
             let plane = plane?;
@@ -165,6 +172,26 @@ mod tests {
     fn level() -> WorldFromCamera {
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -std::f64::consts::FRAC_PI_2);
         Rigid::from_parts(Vector3::new(3.0, -2.0, 1.5), down)
+    }
+
+    #[test]
+    fn an_unknown_floor_is_refused_unless_a_plane_is_given() {
+        let camera = Intrinsics::new(640, 480, [400.0, 400.0, 320.0, 240.0], Model::Pinhole).unwrap();
+        let keyframe = Keyframe {
+            stamp: vice_core::time::Stamp::default(),
+            frame: 0,
+            camera: &camera,
+            body_from_camera: Rigid::identity(),
+            world_from_camera: Some(Rigid::from_parts(
+                Vector3::new(0.0, 0.0, 2.0),
+                UnitQuaternion::from_euler_angles(std::f64::consts::PI, 0.0, 0.0),
+            )),
+            floor: Floor::Unknown,
+        };
+        let error = FloorDepth::new().depths(&keyframe, &[Pixel::new(320.0, 240.0)]).unwrap_err();
+        assert!(error.to_string().starts_with("no floor is known"), "{error}");
+        let given = FloorDepth::with_plane(Plane::z_zero()).depths(&keyframe, &[Pixel::new(320.0, 240.0)]);
+        assert!((given.unwrap()[0].unwrap().z_m - 2.0).abs() < 1e-12);
     }
 
     #[test]

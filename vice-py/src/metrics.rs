@@ -171,7 +171,7 @@ pub(crate) fn compare_trajectories(
     let (document, table, plot, archive) = long(py, None, move |_| {
         let compared = compare_in_memory(&request, &memory)?;
         let json = serde_json::to_string(&compared.document)?;
-        Ok((json, compared.table(), compared.plot(), compared.evo_zip()?))
+        Ok((json, compared.table(false), compared.plot(), compared.evo_zip()?))
     })?;
     Ok(Document::new(document + "\n", table).with("svg", plot.into_bytes()).with("zip", archive))
 }

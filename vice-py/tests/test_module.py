@@ -241,3 +241,25 @@ def test_a_format_that_is_none_is_left_out_with_a_warning(flight: Path, caplog: 
     finally:
         _formats._registered.remove(Odd)
     assert any("is left out" in record.getMessage() for record in caplog.records)
+
+
+def test_the_path_of_your_robot_in_python(flight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """The fifth path of docs/your-robot.md, as it stands there."""
+    page = (Path(__file__).resolve().parents[2] / "docs" / "your-robot.md").read_text()
+    code = page.split("```python\n")[1].split("```")[0]
+    (tmp_path / "my_flight").symlink_to(flight)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(code, "your-robot.md", "exec"), {})
+    assert "RMSE_2D" in capsys.readouterr().out
+
+
+def test_a_folder_is_described(tmp_path: Path, flight: Path) -> None:
+    robot = tmp_path / "robot"
+    (robot / "images").mkdir(parents=True)
+    for picture in sorted((flight / "mav0" / "cam0" / "data").iterdir())[:5]:
+        (robot / "images" / picture.name).symlink_to(picture)
+    document = vice.init(robot)
+    assert document["schema"] == "vice.init/1" and any("calibration" in line for line in document["unknown"])
+    assert (robot / "vice.toml").is_file()
+    with pytest.raises(vice.UsageError):
+        vice.init(robot)

@@ -3,9 +3,12 @@
 use std::path::PathBuf;
 
 use vice_core::conventions::{Convention, Given, cure};
+use vice_core::dataset::{Dataset, GROUND_TRUTH};
 use vice_core::diagnose::mend;
 use vice_core::error::{DataError, ErrorKind};
-use vice_core::time::Stamp;
+use vice_core::evaluate::Stream;
+use vice_core::result::Role;
+use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
 use vice_files::leniency;
 use vice_files::trajectory::ReadOptions;
@@ -13,15 +16,17 @@ use vice_files::trajectory::ReadOptions;
 use crate::diagnosis::DiagnosisResult;
 use crate::error::{RunError, RunResult};
 use crate::formats;
-use crate::request::{DatasetSpec, EstimateSpec};
+use crate::imu_start::ImuStart;
+use crate::recorded::only_stream;
+use crate::request::{DEFAULT_MAX_GAP, DatasetSpec, EstimateSpec, IMU_EULER};
 
 /// Which poses are written, and how they are read.
 #[derive(Clone, Debug)]
 pub struct Conversion {
     /// The recording.
     pub dataset: DatasetSpec,
-    /// A stream of it, or a file of poses.
-    pub stream: EstimateSpec,
+    /// A stream of it, or a file of poses; `None`: the ground truth, or the only stream there is.
+    pub stream: Option<EstimateSpec>,
     /// What the poses are, where that is not what they are read as.
     pub estimate_as: Vec<Convention>,
     /// A diagnosis whose convention, clock, scale and drift are taken out.
@@ -42,11 +47,17 @@ impl Conversion {
             Err(error) if spec.camera.is_some() => return Err(error),
             Err(_) => None,
         };
-        let name = self.stream.to_string();
+        let stream = match &self.stream {
+            Some(stream) => stream.clone(),
+            None => EstimateSpec::from(only_stream(dataset.as_ref(), &spec.path)?),
+        };
+        let name = stream.to_string();
         let is_stream = dataset.streams().contains(&name);
-        let file = self.stream.is_file();
-        let mut trajectory = if !is_stream && file {
-            let read = self.stream.read_file(&ReadOptions::default())?;
+        let file = stream.is_file();
+        let mut trajectory = if !is_stream && stream == EstimateSpec::ImuEuler {
+            integrated(dataset.as_ref(), camera.as_deref())?
+        } else if !is_stream && file {
+            let read = stream.read_file(&ReadOptions::default())?;
             leniency::log(&read.suspicions);
             read.trajectory
         } else {
@@ -74,4 +85,39 @@ impl Conversion {
         }
         Ok(trajectory)
     }
+}
+
+/// Frames at which an integration may start, at most: the first may have no velocity.
+const FIRST_FRAMES: usize = 10;
+
+/// The IMU integrated from the ground truth's state at the first frame that it covers to the last.
+fn integrated(dataset: &dyn Dataset, camera: Option<&str>) -> RunResult<Trajectory> {
+    let camera = camera.ok_or_else(|| {
+        RunError::usage("stream", format!("{IMU_EULER} starts at a frame, and there is no camera"))
+    })?;
+    if !dataset.streams().iter().any(|s| s == GROUND_TRUTH) {
+        return Err(RunError::usage(
+            "stream",
+            format!("{IMU_EULER} starts from a state of the ground truth, and there is none"),
+        ));
+    }
+    let reference = Stream::new(GROUND_TRUTH, Role::Reference, dataset.trajectory(GROUND_TRUTH)?);
+    let frames = dataset.frames(camera)?;
+    let (start, end) = (reference.trajectory.start(), reference.trajectory.end());
+    let covered = || frames.iter().copied().filter(|s| (start..=end).contains(s));
+    // Velocity is fitted to poses on both sides, so that the very first frame may have none.
+    let last = covered().last();
+    let start = |first: Stamp| {
+        let start =
+            ImuStart { dataset, reference: &reference, time_offset: Span::ZERO, max_gap: DEFAULT_MAX_GAP };
+        start.run(first, last?).ok()
+    };
+    let (run, gap) = covered().take(FIRST_FRAMES).find_map(start).ok_or_else(|| {
+        RunError::missing(format!(
+            "{IMU_EULER}: no frame has a state of the ground truth and inertial samples"
+        ))
+    })?;
+    leniency::log(&gap.into_iter().collect());
+    run.integrate(Span::ZERO, nalgebra::Vector3::zeros())
+        .map_err(|e| RunError::usage("stream", IMU_EULER.to_string()).because(e))
 }

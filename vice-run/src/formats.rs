@@ -44,6 +44,7 @@ pub fn built_in() -> Registry {
     let mut registry = Registry::new();
     registry.add(Box::new(vice_blackbird::Blackbird));
     registry.add(Box::new(vice_euroc::Euroc));
+    registry.add(Box::new(vice_images::Images));
     registry.add(Box::new(vice_locobot::Locobot));
     registry.add(Box::new(vice_video::Video));
     registry

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use vice_core::dataset::{Dataset, GROUND_TRUTH};
 use vice_core::diagnose::InertialRun;
-use vice_core::evaluate::{Selection, Stream};
+use vice_core::evaluate::Stream;
 use vice_core::imu::{GRAVITY_Z_UP_M_S2, ImuSample, InertialState, fit_velocity};
 use vice_core::suspicion::Suspicion;
 use vice_core::time::{Span, Stamp};
@@ -14,8 +14,6 @@ use crate::request::IMU_EULER;
 /// What an integration is started from.
 pub(crate) struct ImuStart<'a> {
     pub(crate) dataset: &'a dyn Dataset,
-    pub(crate) frames: &'a [Stamp],
-    pub(crate) selection: &'a Selection<'a>,
     pub(crate) reference: &'a Stream,
     pub(crate) time_offset: Span,
     pub(crate) max_gap: Span,
@@ -23,19 +21,12 @@ pub(crate) struct ImuStart<'a> {
 
 impl ImuStart<'_> {
     /// The run from the first key frame to the last evaluated frame, and a gap that a sample is held across.
-    pub(crate) fn run(&self) -> RunResult<(InertialRun, Option<Suspicion>)> {
+    pub(crate) fn run(&self, start: Stamp, last: Stamp) -> RunResult<(InertialRun, Option<Suspicion>)> {
         let samples = self.dataset.imu()?;
         if samples.is_empty() {
             return Err(RunError::missing(format!("{IMU_EULER}: the data set has no inertial samples"))
                 .of("estimate"));
         }
-        let nothing = |what: &str| RunError::usage("estimate", format!("{IMU_EULER}: {what}"));
-        let start =
-            self.selection.first_keyframe().ok_or_else(|| nothing("there is no key frame to start from"))?;
-        let (_, last) = self
-            .selection
-            .stamp_range(self.frames)
-            .ok_or_else(|| nothing("there is no frame to integrate to"))?;
         let state = self.state(start)?;
         // The clock of the samples is what is off: shifted afterwards, the states would miss the key frame.
         let shifted = |s: &ImuSample| ImuSample { stamp: s.stamp + self.time_offset, ..*s };

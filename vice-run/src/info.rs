@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 use std::fmt::Write;
 
-use vice_core::dataset::{Dataset, Floor};
+use vice_core::dataset::{Dataset, Floor, Plane};
 use vice_core::suspicion::{Suspicion, Suspicions};
 use vice_core::time::{Span, Stamp};
 
@@ -44,12 +44,7 @@ pub fn describe(dataset: &dyn Dataset, camera: Option<&str>) -> RunResult<String
     }
     if let Some(Ok(floor)) = first_frame.map(|stamp| dataset.floor(stamp)) {
         writeln!(text, "floor")?;
-        let (frame, n, d) = match floor {
-            Floor::World(plane) => ("world", plane.normal(), plane.d_m()),
-            Floor::Body(plane) => ("body at the key frame", plane.normal(), plane.d_m()),
-            _ => return Ok(text),
-        };
-        writeln!(text, "  {:.4} x + {:.4} y + {:.4} z + {d:.4} m = 0 in the {frame}", n.x, n.y, n.z)?;
+        writeln!(text, "  {}", floor_line(&floor, dataset.streams().is_empty()))?;
     }
     let mut sections: BTreeMap<String, Vec<String>> = BTreeMap::new();
     let mut known: HashSet<String> = HashSet::new();
@@ -65,6 +60,19 @@ pub fn describe(dataset: &dyn Dataset, camera: Option<&str>) -> RunResult<String
     }
     describe_suspicions(&mut text, dataset, &known)?;
     Ok(text)
+}
+
+/// The floor in words. That z is 0 on it is nothing that is known where no poses say what the world is.
+fn floor_line(floor: &Floor, no_poses: bool) -> String {
+    let (frame, n, d) = match floor {
+        Floor::World(plane) if no_poses && *plane == Plane::z_zero() => {
+            return "not known: no poses say where the world is".to_string();
+        }
+        Floor::World(plane) => ("world", plane.normal(), plane.d_m()),
+        Floor::Body(plane) => ("body at the key frame", plane.normal(), plane.d_m()),
+        _ => return "not known: give --floor-plane, which `vice floor fit` finds".to_string(),
+    };
+    format!("{:.4} x + {:.4} y + {:.4} z + {d:.4} m = 0 in the {frame}", n.x, n.y, n.z)
 }
 
 fn describe_camera(text: &mut String, dataset: &dyn Dataset, name: &str) -> RunResult<Option<Stamp>> {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use vice_core::camera::Camera;
 use vice_core::dataset::{Calibrated, Dataset, Floor, OpenOptions, Plane};
-use vice_core::error::ErrorKind;
+use vice_core::error::{DataError, ErrorKind};
 use vice_core::evaluate::{DatasetRig, Observations};
 use vice_core::frames::World;
 use vice_core::registry::Registry;
@@ -15,6 +15,7 @@ use vice_files::address::{self, is_address};
 use vice_files::calibration::CalibrationFile;
 
 use crate::away::Away;
+use crate::beside::{Told, calibrated};
 use crate::error::{RunError, RunResult};
 use crate::formats;
 use crate::in_memory::InMemory;
@@ -35,6 +36,8 @@ pub struct Opened {
     pub frames: Arc<[Stamp]>,
     /// The calibration file, where one was given.
     pub calibration: Option<CalibrationFile>,
+    /// What a `vice.toml` beside the data set says.
+    pub told: Option<Told>,
     /// Scans that other runs may have read already, where several runs are made.
     pub scans: Option<Arc<Scans>>,
     /// Poses and labels that a request may name though no file holds them.
@@ -54,7 +57,8 @@ impl DatasetSpec {
         self.calibrate(dataset, calibration, floor)
     }
 
-    /// The recording by itself, with formats that were loaded before: no camera is chosen and nothing overridden.
+    /// The recording as a `vice.toml` beside it says that it is, with formats that were loaded before: no camera is chosen,
+    /// and nothing of the request overrides it.
     ///
     /// # Errors
     /// [`RunError`] if no format reads it.
@@ -65,11 +69,24 @@ impl DatasetSpec {
             *value = Place::of_file(Path::new(value))?.path().to_string_lossy().into_owned();
         }
         let place = Place::of_data_set(&self.path)?;
-        let dataset = place.told(registry.open(place.path(), self.format.as_deref(), &options))?;
-        Ok(match place.is_elsewhere() {
+        // A small file first: a mistake in it may be why the data set does not open.
+        let told = place.told(Told::of(place.path()))?;
+        let dataset = registry.open(place.path(), self.format.as_deref(), &options);
+        let dataset = place.told(dataset.map_err(|e| describable(e, &self.path)))?;
+        let dataset: Arc<dyn Dataset> = match place.is_elsewhere() {
             true => Arc::new(Away { inner: dataset, place: place.kept() }),
             false => Arc::from(dataset),
+        };
+        Ok(match told {
+            Some(told) => told.apply(dataset, registry)?,
+            None => dataset,
         })
+    }
+
+    /// What a `vice.toml` beside the recording says.
+    fn told(&self) -> RunResult<Option<Told>> {
+        let place = Place::of_data_set(&self.path)?;
+        Ok(place.told(Told::of(place.path()))?)
     }
 
     /// A data set that is open already, with the camera and the overrides of this request.
@@ -87,25 +104,25 @@ impl DatasetSpec {
         floor: Option<Floor>,
     ) -> RunResult<Opened> {
         let name = self.camera_name(dataset.as_ref())?;
-        let mut calibrated = Calibrated::new(Arc::clone(&dataset));
+        let mut overridden = Calibrated::new(Arc::clone(&dataset));
         let calibration = calibration
             .map(|file| file.for_camera(&name, &dataset.cameras()))
             .transpose()
             .map_err(|e| RunError::new(ErrorKind::Usage, "").because(e).of("calibration"))?;
         if let Some(file) = &calibration {
             // The file may hold only extrinsics, or be all there is where the data set's own is broken.
-            if let Some(camera) = file.camera(&name, dataset.camera(&name).ok().as_ref())? {
-                calibrated = calibrated.with_camera(&name, camera);
+            if let Some(camera) = calibrated(file, &name, dataset.as_ref())? {
+                overridden = overridden.with_camera(&name, camera);
             }
             if let Some(body_from_camera) = file.body_from_camera(&name) {
-                calibrated = calibrated.with_body_from_camera(&name, body_from_camera);
+                overridden = overridden.with_body_from_camera(&name, body_from_camera);
             }
         }
         if let Some(floor) = floor {
-            calibrated = calibrated.with_floor(floor);
+            overridden = overridden.with_floor(floor);
         }
-        let camera = calibrated.camera(&name)?;
-        let frames = calibrated.frames(&name)?;
+        let camera = overridden.camera(&name)?;
+        let frames = overridden.frames(&name)?;
         tracing::info!(
             "{} ({}): camera {name} with {} frames",
             dataset.name(),
@@ -114,11 +131,12 @@ impl DatasetSpec {
         );
         let in_memory = InMemory::default();
         Ok(Opened {
-            dataset: Arc::new(calibrated),
+            dataset: Arc::new(overridden),
             camera_name: name,
             camera,
             frames,
             calibration,
+            told: self.told()?,
             scans: None,
             in_memory,
         })
@@ -167,6 +185,17 @@ impl DatasetSpec {
     }
 }
 
+/// A folder that no format knows may be one of images that nobody described.
+fn describable(error: DataError, path: &Path) -> DataError {
+    match error.hint_text() {
+        Some(hint) if path.is_dir() && error.problem().starts_with("no format recognises") => {
+            let hint = format!("a folder of images is described by `vice init {}`; {hint}", path.display());
+            error.hint(hint)
+        }
+        _ => error,
+    }
+}
+
 impl Protocol {
     /// Indices of the frames that are looked at, where nothing is scored.
     ///
@@ -201,8 +230,9 @@ impl Opened {
         self.calibration.iter().flat_map(|file| file.suspicions().iter().cloned())
     }
 
-    /// Seconds that the calibration adds to the stamps of estimates, where it says so.
+    /// Seconds that the calibration, or a `vice.toml`, adds to the stamps of estimates, where one says so.
     pub fn calibrated_time_offset(&self) -> Option<Span> {
-        self.calibration.as_ref()?.time_offset_of(&self.camera_name)
+        let given = self.calibration.as_ref().and_then(|file| file.time_offset_of(&self.camera_name));
+        given.or_else(|| self.told.as_ref()?.time_offset_of(&self.camera_name))
     }
 }

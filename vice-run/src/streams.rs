@@ -275,13 +275,17 @@ impl<'a> Loader<'a> {
         })?;
         let start = ImuStart {
             dataset: self.opened.dataset.as_ref(),
-            frames: &self.opened.frames,
-            selection,
             reference,
             time_offset: self.time_offset,
             max_gap: self.spec.max_gap,
         };
-        let (run, gap) = start.run()?;
+        let nothing = |what: &str| RunError::usage("estimate", format!("{IMU_EULER}: {what}"));
+        let first =
+            selection.first_keyframe().ok_or_else(|| nothing("there is no key frame to start from"))?;
+        let (_, last) = selection
+            .stamp_range(&self.opened.frames)
+            .ok_or_else(|| nothing("there is no frame to integrate to"))?;
+        let (run, gap) = start.run(first, last)?;
         self.suspicions.extend(gap);
         Ok(run)
     }

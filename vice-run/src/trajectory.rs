@@ -17,10 +17,12 @@ use vice_files::trajectory::{ReadOptions, TrajectoryFormat};
 
 use crate::error::{Context, RunError, RunResult};
 use crate::in_memory::{InMemory, own_name};
+use crate::recorded::Recorded;
 use crate::report::evo_zip::{self, About};
 use crate::report::plots::trajectory as plot;
 use crate::report::table;
 use crate::request::{EstimateSpec, seconds, seconds_option};
+use crate::text::printable;
 
 /// Largest time difference of two poses that belong together, where nothing else is said.
 pub const DEFAULT_T_MAX_DIFF: Span = Span::from_millis(10);
@@ -29,9 +31,9 @@ pub const DEFAULT_T_MAX_DIFF: Span = Span::from_millis(10);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrajectoryRequest {
-    /// File of the reference, or relative motions.
+    /// The reference: a file, relative motions, a data set, or `DATASET:STREAM`.
     pub reference: EstimateSpec,
-    /// File of the estimate, or relative motions.
+    /// The estimate, named alike.
     pub estimate: EstimateSpec,
     /// What the estimate is, where that is not what it is read as.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -220,6 +222,76 @@ pub fn compare_in_memory(request: &TrajectoryRequest, memory: &InMemory) -> RunR
     Ok(Compared { document, estimate_poses, pairs, transform })
 }
 
+/// The document `vice.trajectories/1`: several estimates against one reference.
+#[derive(Clone, Debug, Serialize)]
+pub struct TrajectoriesDocument<'a> {
+    /// The schema's name and version.
+    pub schema: &'static str,
+    /// One for each estimate, in the order in which they were named.
+    pub estimates: Vec<&'a TrajectoryDocument>,
+}
+
+impl<'a> TrajectoriesDocument<'a> {
+    /// Of comparisons with the same reference.
+    pub fn of(compared: &'a [Compared]) -> Self {
+        Self { schema: "vice.trajectories/1", estimates: compared.iter().map(|c| &c.document).collect() }
+    }
+}
+
+/// One table of several estimates, a row each. Angles in radians, or in degrees.
+pub fn render_several(compared: &[Compared], degrees: bool) -> String {
+    let unit = if degrees { "deg" } else { "rad" };
+    let angle = |v: f64| if degrees { v.to_degrees() } else { v };
+    let head = [
+        "estimate",
+        "matched",
+        "RMSE_3D m",
+        &format!("AOE {unit}"),
+        &format!("ROE {unit}"),
+        "APE mean m",
+        "median m",
+        "max m",
+        "RPE rmse m",
+    ];
+    let mut grid = vec![head.map(String::from).to_vec()];
+    let mut problems = String::new();
+    for one in compared {
+        let d = &one.document;
+        let (ape, rpe) = (&d.ape.translation_m, d.rpe.as_ref());
+        grid.push(vec![
+            printable(&d.estimate),
+            format!("{} of {}", d.matched, one.estimate_poses),
+            format!("{:.4}", d.rmse_3d_m),
+            format!("{:.4}", angle(d.aoe_rad)),
+            d.roe_rad.map_or_else(|| "-".to_string(), |v| format!("{:.4}", angle(v))),
+            format!("{:.6}", ape.mean),
+            format!("{:.6}", ape.median),
+            format!("{:.6}", ape.max),
+            rpe.map_or_else(|| "-".to_string(), |r| format!("{:.6}", r.errors.translation_m.rmse)),
+        ]);
+        if let Some(problem) = &d.rpe_problem {
+            problems.push_str(&format!("no RPE of {}: {}\n", printable(&d.estimate), printable(problem)));
+        }
+    }
+    let about = compared.first().map(|one| {
+        let rpe = one.document.rpe.as_ref().map(|r| format!(", RPE over {} {}", r.delta, r.delta_unit));
+        format!(
+            "against {}, align {}{}\n\n",
+            printable(&one.document.reference),
+            one.document.align,
+            rpe.unwrap_or_default()
+        )
+    });
+    format!("{}{}{problems}", about.unwrap_or_default(), table::align(&grid))
+}
+
+/// All paths from above and their differences over time, as SVG.
+pub fn plot_several(compared: &[Compared]) -> String {
+    let all: Vec<(&PosePairs, &str)> =
+        compared.iter().map(|c| (&c.pairs, c.document.estimate.as_str())).collect();
+    plot::file(&all, compared.first().map_or("", |c| c.document.reference.as_str()))
+}
+
 /// A trajectory as it was read.
 struct One {
     trajectory: Trajectory,
@@ -246,7 +318,11 @@ impl TrajectoryRequest {
     /// All that is read.
     pub fn inputs(&self) -> Vec<PathBuf> {
         let specs = [&self.reference, &self.estimate];
-        specs.iter().filter_map(|s| s.path()).map(PathBuf::from).chain(self.times.clone()).collect()
+        let file = |s: &&EstimateSpec| {
+            let recorded = Recorded::of(s).ok().flatten().map(|r| r.data_set);
+            recorded.or_else(|| s.path().map(PathBuf::from))
+        };
+        specs.iter().filter_map(file).chain(self.times.clone()).collect()
     }
 
     fn matching(&self) -> RunResult<Matching> {
@@ -292,6 +368,10 @@ impl TrajectoryRequest {
     }
 
     fn read(&self, spec: &EstimateSpec, index_as_seconds: bool, memory: &InMemory) -> RunResult<One> {
+        if let Some(recorded) = Recorded::of(spec)? {
+            let (trajectory, suspicions) = recorded.read()?;
+            return Ok(One { trajectory, suspicions, kitti: false });
+        }
         if let Some(trajectory) = memory.trajectory(&spec.to_string())? {
             return Ok(One { trajectory: trajectory.clone(), suspicions: Suspicions::new(), kitti: false });
         }
@@ -304,7 +384,7 @@ impl TrajectoryRequest {
 impl Compared {
     /// Both paths from above and their differences over time, as SVG.
     pub fn plot(&self) -> String {
-        plot::file(&self.pairs, &self.document.reference, &self.document.estimate)
+        plot::file(&[(&self.pairs, &self.document.estimate)], &self.document.reference)
     }
 
     /// The APE of translations as an archive that evo's `evo_res` reads.
@@ -321,33 +401,36 @@ impl Compared {
         evo_zip::encode(&self.pairs, &about)
     }
 
-    /// The numbers as a table.
-    pub fn table(&self) -> String {
-        render(&self.document, self.estimate_poses)
+    /// The numbers as a table. Angles in radians, or in degrees.
+    pub fn table(&self, degrees: bool) -> String {
+        render(&self.document, self.estimate_poses, degrees)
     }
 }
 
-fn render(d: &TrajectoryDocument, estimate_poses: usize) -> String {
-    let roe = d.roe_rad.map_or_else(|| "-".to_string(), |v| format!("{v:.4}"));
+fn render(d: &TrajectoryDocument, estimate_poses: usize, degrees: bool) -> String {
+    let unit = if degrees { "deg" } else { "rad" };
+    let angle = |v: f64| if degrees { v.to_degrees() } else { v };
+    let roe = d.roe_rad.map_or_else(|| "-".to_string(), |v| format!("{:.4}", angle(v)));
     let mut text = format!(
-        "matched {} of {estimate_poses} poses, align {}{}\nRMSE_3D {:.4} m, AOE {:.4} rad, ROE {roe} rad\n\n",
+        "matched {} of {estimate_poses} poses, align {}{}\nRMSE_3D {:.4} m, AOE {:.4} {unit}, ROE {roe} {unit}\n\n",
         d.matched,
         d.align,
         if d.scale == 1.0 { String::new() } else { format!(", scale {:.6}", d.scale) },
         d.rmse_3d_m,
-        d.aoe_rad,
+        angle(d.aoe_rad),
     );
     let mut grid = vec![["error", "rmse", "mean", "median", "std", "min", "max"].map(String::from).to_vec()];
-    let mut add = |name: String, s: &Statistics| {
+    let mut add = |name: String, s: &Statistics, as_angle: bool| {
         let numbers = [s.rmse, s.mean, s.median, s.std, s.min, s.max];
+        let numbers = numbers.map(|v| if as_angle { angle(v) } else { v });
         grid.push(std::iter::once(name).chain(numbers.map(|v| format!("{v:.6}"))).collect());
     };
-    add("APE translation m".to_string(), &d.ape.translation_m);
-    add("APE rotation rad".to_string(), &d.ape.rotation_rad);
+    add("APE translation m".to_string(), &d.ape.translation_m, false);
+    add(format!("APE rotation {unit}"), &d.ape.rotation_rad, true);
     if let Some(rpe) = &d.rpe {
         let pairs = format!("{} {}, {} pairs", rpe.delta, rpe.delta_unit, rpe.errors.pairs);
-        add(format!("RPE translation m ({pairs})"), &rpe.errors.translation_m);
-        add("RPE rotation rad".to_string(), &rpe.errors.rotation_rad);
+        add(format!("RPE translation m ({pairs})"), &rpe.errors.translation_m, false);
+        add(format!("RPE rotation {unit}"), &rpe.errors.rotation_rad, true);
     }
     text.push_str(&table::align(&grid));
     if let Some(problem) = &d.rpe_problem {

@@ -8,6 +8,7 @@ use vice_core::dataset::Image;
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::suspicion::Suspicion;
 use vice_files::image_file;
+use vice_files::once::cached;
 
 use crate::listing::Listing;
 use crate::sensor::{self, Calibration};
@@ -65,14 +66,4 @@ impl EurocCamera {
     pub(crate) fn image_file(&self, index: usize) -> DataResult<Vec<u8>> {
         image_file::read_bytes(self.listing()?.path(index)?)
     }
-}
-
-/// Gives what is there or reads it; two threads that read at once keep the first result. Errors are not kept, since
-/// they cannot be given out twice, and reading again finds them again.
-pub(crate) fn cached<T>(cell: &OnceLock<T>, read: impl FnOnce() -> DataResult<T>) -> DataResult<&T> {
-    if let Some(value) = cell.get() {
-        return Ok(value);
-    }
-    let value = read()?;
-    Ok(cell.get_or_init(|| value))
 }

@@ -13,9 +13,10 @@ use vice_core::imu::{ImuSample, InertialState};
 use vice_core::suspicion::{Suspicion, Suspicions};
 use vice_core::time::Stamp;
 use vice_core::trajectory::Trajectory;
+use vice_files::once::cached;
 use vice_files::trajectory::{self, TrajectoryFile};
 
-use crate::camera::{EurocCamera, cached};
+use crate::camera::EurocCamera;
 use crate::depth::EurocDepth;
 use crate::listing::check_unit;
 use crate::{NAME, inertial, sensor};

@@ -7,10 +7,10 @@ use vice_core::dataset::DepthImage;
 use vice_core::error::DataResult;
 use vice_core::statistics::middle;
 use vice_core::suspicion::Suspicion;
-use vice_core::time::{Span, Stamp};
-use vice_files::image_file;
+use vice_core::time::Stamp;
+use vice_files::once::cached;
+use vice_files::{image_file, pairing};
 
-use crate::camera::cached;
 use crate::listing::Listing;
 use crate::sensor::{self, DepthFile};
 
@@ -47,12 +47,8 @@ impl EurocDepth {
 
     /// The depth image nearest to a frame, if it is not nearer to another one.
     pub(crate) fn at(&self, frames: &[Stamp], index: usize) -> DataResult<Option<DepthImage>> {
-        let (listing, stamp) = (self.listing()?, frames[index]);
-        let Some(nearest) = nearest(&listing.stamps, stamp) else { return Ok(None) };
-        let away = listing.stamps[nearest].since(stamp).abs();
-        if away.as_nanos() > half_period(frames, index).as_nanos() {
-            return Ok(None);
-        }
+        let listing = self.listing()?;
+        let Some(nearest) = pairing::belonging(frames, index, &listing.stamps) else { return Ok(None) };
         let path = listing.path(nearest)?;
         let bytes = image_file::read_bytes(&path)?;
         let scale = self.description.metres_per_count;
@@ -89,18 +85,4 @@ impl EurocDepth {
     fn listing(&self) -> DataResult<&Listing> {
         cached(&self.listing, || Listing::read(&self.folder))
     }
-}
-
-/// Half the time to the nearer neighbour of a frame; a lone frame takes only its own stamp.
-fn half_period(frames: &[Stamp], index: usize) -> Span {
-    let before = index.checked_sub(1).map(|i| frames[index].since(frames[i]));
-    let after = frames.get(index + 1).map(|next| next.since(frames[index]));
-    let nearer = before.into_iter().chain(after).min().unwrap_or(Span::ZERO);
-    Span::from_nanos(nearer.as_nanos() / 2)
-}
-
-fn nearest(stamps: &[Stamp], stamp: Stamp) -> Option<usize> {
-    let after = stamps.partition_point(|s| *s < stamp);
-    let candidates = [after.checked_sub(1), (after < stamps.len()).then_some(after)];
-    candidates.into_iter().flatten().min_by_key(|i| stamps[*i].since(stamp).abs())
 }

@@ -72,7 +72,11 @@ impl DatasetFactory for Euroc {
 fn mav_folder(path: &Path) -> Option<PathBuf> {
     let below = path.join("mav0");
     if below.is_dir() {
-        return Some(below);
+        // TUM-VI's export has no sensor.yaml but a camchain of all cameras beside: the format `images` reads it.
+        let bare = below.join("cam0").is_dir() && !below.join("cam0/sensor.yaml").is_file();
+        let chained =
+            [path.join("dso/camchain.yaml"), path.join("camchain.yaml"), below.join("camchain.yaml")];
+        return (!(bare && chained.iter().any(|file| file.is_file()))).then_some(below);
     }
     let has_sensor = ["cam0", "cam1", "imu0", dataset::GROUND_TRUTH_FOLDER]
         .iter()

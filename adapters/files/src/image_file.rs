@@ -76,6 +76,16 @@ pub fn dimensions(path: impl AsRef<Path>) -> DataResult<(u32, u32)> {
     reader.into_dimensions().map_err(|e| not_an_image(e).at(path))
 }
 
+/// Size of an image by the first bytes of its file.
+///
+/// # Errors
+/// [`DataError`] if they are none of a PNG or JPEG.
+pub fn decode_size(bytes: &[u8]) -> DataResult<(u32, u32)> {
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let reader = reader.map_err(|e| DataError::new("the image cannot be read").because(e))?;
+    reader.into_dimensions().map_err(not_an_image)
+}
+
 /// A PNG of an image, quick rather than small.
 ///
 /// # Errors

@@ -13,8 +13,10 @@
 //! | [`yaml`] | YAML with OpenCV's dialect |
 //! | [`leniency`] | what readers repair or leave out, one rule for all |
 //! | [`not_text`] | recordings and archives given where text is expected |
+//! | [`once`], [`pairing`] | what is read once, and which picture belongs to which |
 //! | [`paths`] | names from files, kept below their folder |
 //! | [`address`], [`elsewhere`] | data that is named by a URL, and files that are read by ranges |
+//! | [`vice_toml`] | what a user says of a data set once for all |
 //! | [`atomic`] | writing all or nothing |
 #![forbid(unsafe_code)]
 
@@ -29,10 +31,13 @@ pub mod imu_file;
 pub mod labels;
 pub mod leniency;
 pub mod not_text;
+pub mod once;
+pub mod pairing;
 pub mod paths;
 pub mod rigid_file;
 mod row;
 pub mod rows;
 pub mod tables;
 pub mod trajectory;
+pub mod vice_toml;
 pub mod yaml;

@@ -102,7 +102,11 @@ pub(crate) fn is_toml(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
 }
 
-pub(crate) fn from_toml<T: serde::de::DeserializeOwned>(text: &str) -> DataResult<T> {
+/// TOML as `T`, with the line of what is wrong.
+///
+/// # Errors
+/// [`DataError`] with the line.
+pub fn from_toml<T: serde::de::DeserializeOwned>(text: &str) -> DataResult<T> {
     toml::from_str(text).map_err(|e| {
         let error = DataError::new(format!("is not the TOML expected: {}", e.message().replace('\n', " ")));
         match e.span() {

@@ -7,11 +7,11 @@ use vice_core::dataset::{OpenOptions, SettingInfo};
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::frames::Rigid;
 
+use vice_files::vice_toml::{COMMON, ViceToml};
+
 use crate::pixels::DepthUnit;
 use crate::tf::Transform;
 
-/// The file of settings beside a recording.
-const FILE: &str = "vice.toml";
 /// Its table, where it has more than the settings of one format.
 const TABLE: &str = "locobot";
 
@@ -81,8 +81,7 @@ impl Settings {
         let folder = if path.is_dir() { Some(path) } else { path.parent() };
         let folder = folder.unwrap_or(Path::new("")).to_path_buf();
         let mut settings = Self { values: BTreeMap::new(), folder };
-        let file = settings.folder.join(FILE);
-        if file.is_file() {
+        if let Some(file) = ViceToml::place(path) {
             let text = std::fs::read_to_string(&file)
                 .map_err(|e| DataError::new("cannot be read").at(&file).because(e))?;
             settings.values = parse(&text).map_err(|e| e.at(&file))?;
@@ -161,7 +160,10 @@ fn parse(text: &str) -> DataResult<BTreeMap<String, String>> {
         Some(toml::Value::Table(own)) => own,
         Some(_) => return Err(DataError::new(format!("[{TABLE}] is not a table"))),
         // Without a table of its own every plain value is meant for this format.
-        None => table.into_iter().filter(|(_, value)| !value.is_table()).collect(),
+        None => table
+            .into_iter()
+            .filter(|(key, value)| !value.is_table() && !COMMON.contains(&key.as_str()))
+            .collect(),
     };
     let mut values = BTreeMap::new();
     for (key, value) in own {
@@ -187,7 +189,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let toml =
             "other = 1\n[locobot]\nbase_frame = \"base\"\nodom_frame = \"o\"\nmax_depth_offset = 0.01\n";
-        std::fs::write(folder.path().join(FILE), toml).unwrap();
+        std::fs::write(folder.path().join("vice.toml"), toml).unwrap();
+        std::fs::write(folder.path().join("a.bag"), "").unwrap();
         let options = OpenOptions { settings: [("odom_frame".to_string(), "odom2".to_string())].into() };
         let settings = Settings::load(&folder.path().join("a.bag"), &options).unwrap();
         assert_eq!((settings.get("base_frame"), settings.get("odom_frame")), (Some("base"), Some("odom2")));
@@ -201,6 +204,10 @@ mod tests {
         assert!(parse("a = [").unwrap_err().to_string().starts_with("line 1: is not TOML"));
         assert!(parse("urdf = [1]").is_err());
         assert!(parse("[euroc]\nx = 1").unwrap().is_empty(), "a table of another format");
+        assert!(
+            parse("calibration = \"c.yaml\"\nfloor = [0, 0, 1, 0]").unwrap().is_empty(),
+            "keys of every format"
+        );
         let set = |key: &str, value: &str| Settings {
             values: [(key.to_string(), value.to_string())].into(),
             folder: PathBuf::new(),

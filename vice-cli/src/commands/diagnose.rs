@@ -66,6 +66,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         return Err(usage(format!("--apply {}: name a file that ends in .toml", apply.display())));
     }
     let opened = request.open()?;
+    let request = args.evaluation.completed(request, &opened)?;
     let looking = args.looking.spec();
     let answers = with_progress(verbosity, |progress| diagnose_all(&request, &opened, &looking, progress))?;
     terminal::warn(answers.suspicions.iter());

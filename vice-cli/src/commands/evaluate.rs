@@ -106,6 +106,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     let outputs =
         Outputs::new(&[&files.json, &files.csv, &files.latex, &files.report, &samples], &request.inputs())?;
     let opened = request.open()?;
+    let request = args.evaluation.completed(request, &opened)?;
     // The page plots samples even where the document is to list none.
     let keep = files.report.is_some() || (files.samples == SamplesTo::All && files.json.is_some());
     let mut document = with_progress(verbosity, |progress| match &samples {
@@ -132,7 +133,8 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         files.latex.as_ref().map(|path| report::latex::render(&document).map(|t| (path, t))).transpose()?;
     let texts: Vec<(&PathBuf, String)> = [csv, latex, page].into_iter().flatten().collect();
     let json_printed = files.json.as_ref().map_or(Ok(false), |path| outputs.write_json(path, &document))?;
-    if !(outputs.write(&texts)? || json_printed) {
+    let in_a_file = files.json.is_some() && verbosity.is_quiet();
+    if !(outputs.write(&texts)? || json_printed || in_a_file) {
         terminal::print(&report::table::render(&document))?;
     } else {
         // The table has them in it.

@@ -1,11 +1,15 @@
 //! `vice formats`.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::path::PathBuf;
 
+use vice_run::core::dataset::FormatInfo;
 use vice_run::formats::Formats;
 
 use crate::inputs::PluginArgs;
-use crate::terminal::{self, Outcome, printable};
+use crate::outputs::JsonArgs;
+use crate::terminal::{Outcome, Verbosity, printable};
 
 /// Arguments of `vice formats`.
 #[derive(Debug, clap::Args)]
@@ -15,9 +19,32 @@ use crate::terminal::{self, Outcome, printable};
 pub(crate) struct Args {
     #[command(flatten)]
     plugins: PluginArgs,
+    #[command(flatten)]
+    json: JsonArgs,
 }
 
-pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
+/// The document `vice.formats/1`.
+#[derive(serde::Serialize)]
+struct FormatsDocument {
+    schema: &'static str,
+    formats: Vec<FormatEntry>,
+    /// Why libraries that nobody named were not loaded.
+    not_loaded: Vec<String>,
+}
+
+#[derive(serde::Serialize)]
+struct FormatEntry {
+    name: String,
+    version: String,
+    description: String,
+    offers: Vec<String>,
+    /// Settings and what they do.
+    settings: BTreeMap<String, String>,
+    /// The library that it came with; nothing where it is built in.
+    plugin: Option<PathBuf>,
+}
+
+pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
     let formats = Formats::load(&args.plugins.spec())?;
     let mut text = String::new();
     for format in formats.registry.formats() {
@@ -43,6 +70,22 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     for line in &formats.left_out {
         writeln!(text, "    {}", printable(line))?;
     }
-    terminal::print(&text)?;
+    let entry = |format: FormatInfo| {
+        let plugin = formats.plugins.iter().find(|p| p.plugin.info().name == format.name);
+        FormatEntry {
+            plugin: plugin.map(|p| p.plugin.path().to_path_buf()),
+            settings: format.settings.into_iter().map(|s| (s.key, s.description)).collect(),
+            name: format.name,
+            version: format.version,
+            description: format.description,
+            offers: format.offers,
+        }
+    };
+    let document = FormatsDocument {
+        schema: "vice.formats/1",
+        formats: formats.registry.formats().into_iter().map(entry).collect(),
+        not_loaded: formats.left_out.clone(),
+    };
+    args.json.put(&args.plugins.files, &document, verbosity, || text)?;
     Ok(Outcome::Done)
 }

@@ -7,10 +7,12 @@ use vice_run::check::{CheckRequest, check_open, head};
 use vice_run::core::dataset::Probe;
 use vice_run::formats;
 use vice_run::info::describe;
+use vice_run::info_document::document;
 use vice_run::place::Place;
 
 use crate::inputs::DatasetArgs;
-use crate::terminal::{self, Outcome, printable};
+use crate::outputs::JsonArgs;
+use crate::terminal::{self, Outcome, Verbosity, printable};
 
 /// Arguments of `vice info`.
 #[derive(Debug, clap::Args)]
@@ -18,9 +20,11 @@ use crate::terminal::{self, Outcome, printable};
 pub(crate) struct Args {
     #[command(flatten)]
     dataset: DatasetArgs,
+    #[command(flatten)]
+    json: JsonArgs,
 }
 
-pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
     let spec = args.dataset.spec();
     let registry = formats::registry(&spec.plugins)?;
     if spec.format.is_none()
@@ -33,15 +37,23 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     if spec.camera.is_some() {
         spec.camera_name(dataset.as_ref())?;
     }
+    let inputs: Vec<PathBuf> = args.dataset.path.iter().cloned().collect();
+    if args.json.json.as_deref() == Some(Path::new("-")) {
+        let document = document(dataset.as_ref(), spec.camera.as_deref());
+        args.json.put(&inputs, &document, verbosity, String::new)?;
+        return Ok(Outcome::Done);
+    }
     let request = CheckRequest { dataset: spec.clone(), ..CheckRequest::default() };
     // What cannot be checked is said where it is asked for; what the data set holds is shown all the same.
     let checked = check_open(&request, dataset.clone()).ok();
     let text = describe(dataset.as_ref(), spec.camera.as_deref())?;
     let head = checked.map_or_else(String::new, |document| head(&document));
-    terminal::print(&match text.split_once('\n') {
+    let text = match text.split_once('\n') {
         Some((first, rest)) => format!("{first}\n{head}{rest}"),
         None => text,
-    })?;
+    };
+    let document = args.json.json.as_ref().map(|_| document(dataset.as_ref(), spec.camera.as_deref()));
+    args.json.put(&inputs, &document, verbosity, || text)?;
     Ok(Outcome::Done)
 }
 

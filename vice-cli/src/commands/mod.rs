@@ -18,6 +18,7 @@ pub(crate) mod evaluate;
 pub(crate) mod floor;
 pub(crate) mod formats;
 pub(crate) mod info;
+pub(crate) mod init;
 pub(crate) mod labels;
 pub(crate) mod overlay;
 pub(crate) mod plugin;

@@ -47,6 +47,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         return Err(usage("--film-fps: a folder of frames has no rate; name a film"));
     }
     let opened = request.open()?;
+    let request = args.evaluation.completed(request, &opened)?;
     let count = with_progress(verbosity, |progress| -> anyhow::Result<usize> {
         let document = request.evaluate(&opened, Samples::Keep, progress)?;
         terminal::warn(document.suspicions.iter());

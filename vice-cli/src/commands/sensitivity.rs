@@ -38,6 +38,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     let request = args.evaluation.request(Scoring::default())?;
     let outputs = Outputs::new(&[&args.json, &args.csv, &args.svg], &request.inputs())?;
     let opened = request.open()?;
+    let request = args.evaluation.completed(request, &opened)?;
     let looking = args.looking.spec();
     let (document, suspicions) =
         with_progress(verbosity, |progress| sensitivity_of(&request, &opened, &looking, progress))?;

@@ -9,26 +9,30 @@ use vice_run::core::metrics::rpe::DeltaUnit;
 use vice_run::core::time::{Span, Stamp};
 use vice_run::files::atomic::{self, Overwrite};
 use vice_run::request::EstimateSpec;
-use vice_run::trajectory::{TrajectoryRequest, compare_trajectories};
+use vice_run::trajectory::{
+    Compared, TrajectoriesDocument, TrajectoryRequest, compare_trajectories, plot_several, render_several,
+};
 
 use crate::inputs::{span, span_not_negative, to_json};
 use crate::outputs::Outputs;
-use crate::terminal::{self, Outcome};
+use crate::terminal::{self, Outcome, Verbosity, usage};
 
 /// Arguments of `vice trajectory`.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example: vice trajectory ground_truth.csv estimate.txt --align se3 --delta 1 --delta-unit meters --all-pairs\n\n\
     Files are tables with a heading that names the columns, else TUM, EuRoC CSV or KITTI by their content, or relative\n\
-    motions as rel:FILE."
+    motions as rel:FILE. A data set is its ground truth or its only stream; DATASET:STREAM is another, as run.bag:/odom or\n\
+    run.bag:/tf:map.base_link.\n\n\
+    Several estimates make one table and one plot: vice trajectory V1_01_easy vins.txt orb.txt --align se3 --plot all.svg"
 )]
 pub(crate) struct Args {
     /// Reference trajectory.
     #[arg(value_name = "REF")]
     reference: EstimateSpec,
-    /// Estimated trajectory.
-    #[arg(value_name = "EST")]
-    estimate: EstimateSpec,
+    /// Estimated trajectories.
+    #[arg(value_name = "EST", required = true)]
+    estimates: Vec<EstimateSpec>,
     /// What the estimate is, where that is not what it is read as: inverse, wxyz, conjugate, mm, ned, ...
     #[arg(long, value_name = "WORD,...", value_delimiter = ',')]
     estimate_as: Vec<Convention>,
@@ -42,7 +46,14 @@ pub(crate) struct Args {
     #[arg(long, value_name = "S", value_parser = span_not_negative)]
     t_max_diff: Option<Span>,
     /// Seconds added to the stamps of the estimate.
-    #[arg(long, value_name = "S", default_value = "0", allow_hyphen_values = true, value_parser = span)]
+    #[arg(
+        long = "time-offset",
+        alias = "t-offset",
+        value_name = "S",
+        default_value = "0",
+        allow_hyphen_values = true,
+        value_parser = span
+    )]
     t_offset: Span,
     /// Interpolate the reference at the stamps of the estimate instead of taking the nearest pose.
     #[arg(long)]
@@ -74,7 +85,10 @@ pub(crate) struct Args {
     /// Times of KITTI files [default: times.txt beside each].
     #[arg(long, value_name = "FILE")]
     times: Option<PathBuf>,
-    /// Result document, vice.trajectory/1; - prints it in place of the table.
+    /// Show angles in degrees; documents keep radians.
+    #[arg(long)]
+    deg: bool,
+    /// Result document, vice.trajectory/1, of several estimates vice.trajectories/1; - prints it in place of the table.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Both paths from above and their differences over time.
@@ -86,10 +100,10 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    fn request(&self) -> TrajectoryRequest {
+    fn request(&self, estimate: &EstimateSpec) -> TrajectoryRequest {
         TrajectoryRequest {
             reference: self.reference.clone(),
-            estimate: self.estimate.clone(),
+            estimate: estimate.clone(),
             estimate_as: self.estimate_as.clone(),
             align: self.align,
             n_to_align: self.n_to_align.map(|n| usize::try_from(n).unwrap_or(usize::MAX)),
@@ -109,24 +123,39 @@ impl Args {
     }
 }
 
-pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let request = args.request();
-    let outputs = Outputs::new(&[&args.json, &args.plot, &args.evo_zip], &request.inputs())?;
-    let compared = compare_trajectories(&request)?;
-    terminal::warn(compared.document.suspicions.iter());
+pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
+    let requests: Vec<TrajectoryRequest> =
+        args.estimates.iter().map(|estimate| args.request(estimate)).collect();
+    let inputs: Vec<PathBuf> = requests.iter().flat_map(TrajectoryRequest::inputs).collect();
+    let outputs = Outputs::new(&[&args.json, &args.plot, &args.evo_zip], &inputs)?;
+    if args.evo_zip.is_some() && requests.len() > 1 {
+        return Err(usage("--evo-zip: an archive of evo's holds one estimate; name one"));
+    }
+    let compared: Vec<Compared> = requests.iter().map(compare_trajectories).collect::<Result<_, _>>()?;
+    for one in &compared {
+        terminal::warn(one.document.suspicions.iter());
+    }
     let mut texts = Vec::new();
     if let Some(path) = &args.json {
-        texts.push((path, to_json(&compared.document)?));
+        let text = match compared.as_slice() {
+            [one] => to_json(&one.document)?,
+            several => to_json(&TrajectoriesDocument::of(several))?,
+        };
+        texts.push((path, text));
     }
     if let Some(path) = &args.plot {
-        texts.push((path, compared.plot()));
+        texts.push((path, plot_several(&compared)));
     }
-    if let Some(path) = &args.evo_zip {
-        let bytes = compared.evo_zip()?;
+    if let (Some(path), [one]) = (&args.evo_zip, compared.as_slice()) {
+        let bytes = one.evo_zip()?;
         atomic::write(path, Overwrite::Replace, |out| out.write_all(&bytes))?;
     }
-    if !outputs.write(&texts)? {
-        terminal::print(&compared.table())?;
+    let in_a_file = args.json.is_some() && verbosity.is_quiet();
+    if !outputs.write(&texts)? && !in_a_file {
+        terminal::print(&match compared.as_slice() {
+            [one] => one.table(args.deg),
+            several => render_several(several, args.deg),
+        })?;
     }
     Ok(Outcome::Done)
 }

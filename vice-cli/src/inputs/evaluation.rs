@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use vice_run::core::evaluate::Observations;
 use vice_run::core::time::Span;
+use vice_run::open::Opened;
 use vice_run::request::{LabelsSpec, Protocol, Request, Scoring};
 
 use super::{DatasetArgs, DepthArgs, StreamArgs, positive, span_not_negative, split_list};
@@ -46,7 +47,9 @@ pub(crate) const ASKED: [&str; 31] = [
 /// What must be named where no file holds it.
 fn unless_requested(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
-        "path" | "labels" | "estimate" => argument.required(false).required_unless_present("request"),
+        "path" => argument.required(false).required_unless_present("request"),
+        // The data set, or its vice.toml, may say them.
+        "labels" | "estimate" => argument.required(false),
         _ => argument,
     }
 }
@@ -145,5 +148,11 @@ impl EvaluationArgs {
         };
         request.check()?;
         Ok(request)
+    }
+
+    /// The request with labels and estimates that the open data set says, where none are named. A request in a file asks
+    /// what it asked before.
+    pub(crate) fn completed(&self, request: Request, opened: &Opened) -> anyhow::Result<Request> {
+        Ok(if self.request.is_some() { request } else { request.completed(opened)? })
     }
 }

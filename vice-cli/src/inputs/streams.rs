@@ -53,7 +53,7 @@ impl PoseArgs {
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Pose streams")]
 pub(crate) struct StreamArgs {
-    /// Estimates to evaluate: names of streams, imu-euler, or files.
+    /// Estimates to evaluate: names of streams, imu-euler, or files [default: all streams of the data set].
     #[arg(long, value_name = "NAME|FILE,...", required = true)]
     estimate: Vec<String>,
     #[command(flatten)]

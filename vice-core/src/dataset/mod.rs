@@ -129,7 +129,7 @@ pub trait Dataset: Send + Sync {
         Ok(None)
     }
 
-    /// The floor as it is known at a key frame. By default z = 0 of the world.
+    /// The floor as it is known at a key frame. By default z = 0 of the world; [`Floor::Unknown`] where nothing tells.
     ///
     /// # Errors
     /// [`DataError`](crate::error::DataError) if the floor depends on data that is missing at that stamp.

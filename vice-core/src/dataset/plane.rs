@@ -83,6 +83,9 @@ pub enum Floor {
     World(Plane<World>),
     /// In the body at the key frame (a ground robot stands on it): no anchor is used.
     Body(Plane<Body>),
+    /// Nowhere that is known: nothing says which way is up, or how high the world's origin lies. Depth by the floor is
+    /// refused, and nothing else asks.
+    Unknown,
 }
 
 #[cfg(test)]

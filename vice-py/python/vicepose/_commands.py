@@ -134,6 +134,16 @@ def fit_floor(run: Any, **options: Any) -> str:
     return _run(["floor", "fit"], [run], options)
 
 
+def init(run: Any, **options: Any) -> dict[str, Any]:
+    """Writes a ``vice.toml`` for a folder of images, or beside any recording: the document ``vice.init/1``.
+
+    ``found`` is sure, ``guessed`` is worth a look, ``unknown`` has to be filled in; ``fps=30`` where the images have no
+    stamps, ``force=True`` replaces the file.
+    """
+    document: dict[str, Any] = json.loads(_run(["init"], [run], {**options, "json": True}))
+    return document
+
+
 def new_plugin(*places: Any, **options: Any) -> str:
     """Writes the project of a new plugin in Rust or C++; in Python a class is enough, see :func:`vicepose.open`."""
     return _run(["plugin", "new"], places, options)

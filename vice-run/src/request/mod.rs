@@ -16,11 +16,13 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use vice_core::conventions::Convention;
+use vice_core::dataset::GROUND_TRUTH;
 pub use vice_core::evaluate::DEFAULT_MAX_GAP;
 use vice_core::evaluate::{Observations, Window};
 use vice_core::metrics::align::Alignment;
 use vice_core::time::Span;
 use vice_detect::TagFamily;
+use vice_files::vice_toml::ViceToml;
 
 pub use automatic::{DEFAULT_POINTS, MOST_POINTS, is_auto, labels_shown, points_asked};
 pub use depth_name::{DepthName, ZMapInterpolation};
@@ -30,6 +32,7 @@ pub(crate) use word::{seconds, seconds_option};
 
 use crate::error::{RunError, RunResult};
 use crate::in_memory::is_in_memory;
+use crate::open::Opened;
 
 /// Everything that says what is evaluated, and how.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -276,6 +279,37 @@ impl Request {
         }
     }
 
+    /// The same, where what is not named is what the data set says: labels of its `vice.toml`, and all its streams but the
+    /// reference as estimates.
+    ///
+    /// # Errors
+    /// [`RunError`] of the kind usage if no labels are named anywhere.
+    pub fn completed(mut self, opened: &Opened) -> RunResult<Self> {
+        if self.labels.file.as_os_str().is_empty() {
+            let told = opened.told.as_ref().map(|told| &told.file.labels);
+            let Some((file, points)) = told.and_then(|l| Some((l.file.clone()?, &l.points))) else {
+                return Err(RunError::usage("labels", "no file of labels is named").advise(
+                    "name one, or `auto`; or write it into the data set's vice.toml: [labels] file",
+                ));
+            };
+            self.labels.file = file;
+            if self.labels.points.is_empty() {
+                self.labels.points.clone_from(points);
+            }
+            points_asked(&self.labels.file)?;
+        }
+        if self.streams.estimates.is_empty() {
+            let reference = match &self.streams.reference {
+                ReferenceSpec::Default => Some(GROUND_TRUTH.to_string()),
+                ReferenceSpec::None => None,
+                ReferenceSpec::Named(spec) => Some(spec.to_string()),
+            };
+            let others = opened.dataset.streams().into_iter().filter(|name| Some(name) != reference.as_ref());
+            self.streams.estimates = others.map(EstimateSpec::from).collect();
+        }
+        Ok(self)
+    }
+
     /// The command line of `vice evaluate` that asks for the same.
     pub fn command_line(&self) -> String {
         command_line::of(self)
@@ -305,6 +339,7 @@ impl Request {
             files.push(PathBuf::from(name));
         }
         files.extend(self.streams.times.iter().chain(&self.dataset.calibration).cloned());
+        files.extend(beside(&self.dataset.path));
         if let EstimateFrame::File(file) = &self.streams.estimate_frame {
             files.push(file.clone());
         }
@@ -328,6 +363,16 @@ impl Request {
         }
         Ok(())
     }
+}
+
+/// The `vice.toml` of a data set, and what it names.
+fn beside(data_set: &Path) -> Vec<PathBuf> {
+    let Some(file) = ViceToml::place(data_set) else { return Vec::new() };
+    let told = ViceToml::read(&file).unwrap_or_default();
+    let labels = told.labels.file.filter(|file| !is_auto(file));
+    let streams = told.streams.into_values().flat_map(|s| std::iter::once(s.file).chain(s.times));
+    let named = told.calibration.into_iter().chain(told.cloud).chain(labels);
+    std::iter::once(file).chain(named).chain(streams).collect()
 }
 
 impl StreamsSpec {

@@ -204,6 +204,31 @@ impl CalibrationFile {
         }
     }
 
+    /// The file for pictures of this size, which a data set without a calibration of its own has: taken where the file says
+    /// none.
+    ///
+    /// # Errors
+    /// [`DataError`] with the path if the file is of another size.
+    pub fn of_pictures(&self, name: &str, size: [u32; 2]) -> DataResult<Self> {
+        let mut file = self.clone();
+        let Some(entry) = file.cameras.get_mut(name) else { return Ok(file) };
+        match entry.resolution {
+            Some([w, h]) if [w, h] != size => Err(DataError::of_kind(
+                ErrorKind::Contradictory,
+                format!(
+                    "[{name}]: the calibration is of {w}x{h} images, the data set's have {}x{}",
+                    size[0], size[1]
+                ),
+            )
+            .at(&self.path)
+            .hint("were the images made smaller? Then size and intrinsics are smaller too")),
+            _ => {
+                entry.resolution = Some(size);
+                Ok(file)
+            }
+        }
+    }
+
     /// Extrinsics of a camera, where the file has them.
     pub fn body_from_camera(&self, name: &str) -> Option<BodyFromCamera> {
         self.cameras.get(name)?.body_from_camera

@@ -86,9 +86,12 @@ impl Check<'_> {
                     let (frame, z) = match floor {
                         Floor::World(plane) => ("world", plane.normal().z),
                         Floor::Body(plane) => ("body", plane.normal().z),
-                        _ => ("unknown frame", 1.0),
+                        _ => ("", 1.0),
                     };
-                    self.good(format!("the floor is known in the {frame}"));
+                    match frame {
+                        "" => self.good("the floor is said to be unknown".to_string()),
+                        frame => self.good(format!("the floor is known in the {frame}")),
+                    }
                     if frame == "world" && z.abs() < 0.7 {
                         self.suspicious("the floor is steep in the world: does its z point up?");
                     }
