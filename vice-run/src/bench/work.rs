@@ -69,6 +69,10 @@ fn camera(model: ModelName) -> RunResult<Camera> {
         ModelName::Equidistant => {
             ("equidistant", &[0.0034823894, 0.00071503484, -0.0020532361, 0.00020293673])
         }
+        ModelName::Ds => ("ds", &[-0.18, 0.59]),
+        ModelName::Eucm => ("eucm", &[0.63, 1.04]),
+        ModelName::Omni => ("omni", &[0.9, -0.2, 0.05, 0.0005, -0.0003]),
+        ModelName::Fov => ("fov", &[0.93]),
     };
     let model = Model::from_name(name, coefficients)?;
     Ok(Camera::new(752, 480, [458.654, 457.296, 367.215, 248.375], model)?)

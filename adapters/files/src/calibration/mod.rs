@@ -5,7 +5,7 @@
 //! time_offset_s = 0.02             # added to the stamps of an estimate
 //!
 //! [cam0]
-//! model = "radtan"                 # pinhole, radtan, rational, equidistant
+//! model = "radtan"                 # pinhole, radtan, rational, equidistant, ds, eucm, omni, fov
 //! resolution = [752, 480]
 //! intrinsics = [458.654, 457.296, 367.215, 248.375]   # fx, fy, cx, cy in pixels
 //! distortion = [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]
