@@ -81,14 +81,14 @@ impl DepthSpec {
                 Ok(Box::new(ZCamDepth::new(Arc::clone(dataset), camera, options)?))
             }
             DepthName::Mesh => {
-                let reference = cloud_of(name, dataset.as_ref())?;
-                let CloudSource::Ply(path) = &reference.source else {
+                let reference = mesh_of(dataset.as_ref())?;
+                let CloudSource::File(path) = &reference.source else {
                     return Err(RunError::missing(format!(
                         "{}: the depth source mesh needs a PLY with faces",
                         dataset.name()
                     )));
                 };
-                Ok(Box::new(MeshDepth::new(Arc::new(Mesh::read_ply(path)?), reference.world_from_cloud)))
+                Ok(Box::new(MeshDepth::new(Arc::new(Mesh::read(path)?), reference.world_from_cloud)))
             }
             DepthName::Tag => {
                 let size_m = self.tag_size_m.ok_or_else(|| {
@@ -116,9 +116,16 @@ impl DepthSpec {
     }
 }
 
+fn mesh_of(dataset: &dyn Dataset) -> RunResult<CloudRef> {
+    dataset.mesh()?.ok_or_else(|| {
+        RunError::missing(format!("{} has no mesh for the depth source mesh", dataset.name()))
+            .advise("give a PLY with faces with `mesh`, or use `depth` floor")
+    })
+}
+
 fn cloud_of(source: DepthName, dataset: &dyn Dataset) -> RunResult<CloudRef> {
     dataset.cloud()?.ok_or_else(|| {
         RunError::missing(format!("{} has no point cloud for the depth source {source}", dataset.name()))
-            .advise("use `depth` floor")
+            .advise("give a PLY, PCD, LAS or LAZ file with `cloud`, or use `depth` floor")
     })
 }

@@ -44,18 +44,21 @@ pub fn is_field(text: &str) -> bool {
 }
 
 /// Fields that have an option of the same name.
-const FIELDS: [&str; 37] = [
+const FIELDS: [&str; 44] = [
     "add",
     "align",
     "allow-writable-plugin",
     "anchor",
     "at",
+    "body-from-camera",
     "calibration",
     "camera",
     "chessboard",
+    "cloud",
     "cloud-voxel",
     "depth",
     "depth-check",
+    "distortion",
     "duration",
     "estimate",
     "estimate-as",
@@ -65,12 +68,15 @@ const FIELDS: [&str; 37] = [
     "format",
     "fps",
     "from",
+    "image-size",
     "initial-pose",
     "interpolate",
+    "intrinsics",
     "label-noise",
     "labels",
     "max-gap",
     "mend",
+    "mesh",
     "observations",
     "plugin",
     "points",
@@ -80,6 +86,7 @@ const FIELDS: [&str; 37] = [
     "start",
     "tag-size",
     "time-offset",
+    "world-from-cloud",
     "zmap-interpolation",
     "zmap-occlusion",
 ];

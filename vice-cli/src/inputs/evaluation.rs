@@ -9,7 +9,7 @@ use vice_run::request::{LabelsSpec, Protocol, Request, Scoring};
 use super::{DatasetArgs, DepthArgs, StreamArgs, positive, span_not_negative, split_list};
 
 /// What a request in a file takes the place of.
-pub(crate) const ASKED: [&str; 31] = [
+pub(crate) const ASKED: [&str; 38] = [
     "path",
     "format",
     "settings",
@@ -40,7 +40,14 @@ pub(crate) const ASKED: [&str; 31] = [
     "zcam_range",
     "tag_size",
     "tag_family",
+    "cloud",
+    "mesh",
+    "world_from_cloud",
     "calibration",
+    "intrinsics",
+    "distortion",
+    "image_size",
+    "body_from_camera",
 ];
 
 /// What must be named where no file holds it.

@@ -13,7 +13,7 @@ use vice_core::frames::{BodyFromCamera, Rigid, WorldFromCamera};
 use vice_core::random::Congruential;
 use vice_core::time::Stamp;
 use vice_core::track::track_batch;
-use vice_depth::{Cloud, CloudOptions, ZMapDepth, ZMapOptions, depth_image, read_ply_points};
+use vice_depth::{Cloud, CloudOptions, ZMapDepth, ZMapOptions, depth_image, read_scan_points};
 
 use super::limits::{copy_bytes, seconds};
 use super::scan::room;
@@ -176,7 +176,7 @@ impl Work {
                 let mut failed = None;
                 let mut buffer = Vec::with_capacity(*bytes);
                 let (best, read) = rounds(
-                    || seconds(|| failed = read_ply_points(&*path, &CloudOptions::default()).err()),
+                    || seconds(|| failed = read_scan_points(&*path, &CloudOptions::default()).err()),
                     || {
                         buffer.clear();
                         seconds(|| {

@@ -35,6 +35,13 @@ fn options(request: &Request) -> Vec<(&'static str, String)> {
         add("plugin", Some(file.display().to_string()));
     }
     add("calibration", dataset.calibration.as_deref().map(told));
+    add("intrinsics", dataset.intrinsics.and_then(|k| numbers(&k)));
+    add("distortion", dataset.distortion.as_ref().map(ToString::to_string));
+    add("image-size", dataset.image_size.map(|size| size.to_string()));
+    add("body-from-camera", dataset.body_from_camera.as_deref().and_then(numbers));
+    add("cloud", dataset.cloud.as_deref().map(told));
+    add("mesh", dataset.mesh.as_deref().map(told));
+    add("world-from-cloud", dataset.world_from_cloud.as_deref().map(told));
     add("floor-plane", dataset.floor_plane.and_then(|p| numbers(&p)));
     add("labels", Some(told(&labels.file)));
     add("points", list(labels.points.clone()));

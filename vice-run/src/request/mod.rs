@@ -8,6 +8,7 @@ mod automatic;
 mod command_line;
 mod depth_name;
 mod estimate;
+mod plain;
 mod secrets;
 mod word;
 
@@ -25,6 +26,8 @@ use vice_detect::TagFamily;
 pub use automatic::{DEFAULT_POINTS, MOST_POINTS, is_auto, labels_shown, points_asked};
 pub use depth_name::{DepthName, ZMapInterpolation};
 pub use estimate::{Anchor, EstimateFrame, EstimateSpec, IMU_EULER, ReferenceSpec};
+
+pub use plain::{ImageSize, LensSpec};
 
 pub(crate) use word::{seconds, seconds_option};
 
@@ -74,13 +77,47 @@ pub struct DatasetSpec {
     /// Camera; `None`: the first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<String>,
-    /// Calibration file that overrides the data set's: TOML, or a Kalibr camchain.
+    /// Calibration file that overrides the data set's: TOML, or what another tool wrote.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
         serialize_with = "word::path_option::serialize"
     )]
     pub calibration: Option<PathBuf>,
+    /// Intrinsics that override the calibration's: fx, fy, cx, cy in pixels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intrinsics: Option<[f64; 4]>,
+    /// Lens that overrides the calibration's, such as `radtan:k1,k2,p1,p2`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distortion: Option<LensSpec>,
+    /// Columns and rows of the images that the calibration is of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub image_size: Option<ImageSize>,
+    /// The camera's place in the body: x, y, z in metres and the quaternion x, y, z, w, or a matrix row by row.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_from_camera: Option<Vec<f64>>,
+    /// Scan of the scene in place of the data set's: PLY, PCD, LAS or LAZ.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "word::path_option::serialize"
+    )]
+    pub cloud: Option<PathBuf>,
+    /// Faces of the scene in place of the data set's: a PLY file.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "word::path_option::serialize"
+    )]
+    pub mesh: Option<PathBuf>,
+    /// File with the place of the cloud and the mesh in the world; `None`: they are in the world's frame, or what the data
+    /// set says of its own.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "word::path_option::serialize"
+    )]
+    pub world_from_cloud: Option<PathBuf>,
     /// Floor plane `n·p + d = 0` in the world in place of the data set's: nx, ny, nz, d in metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub floor_plane: Option<[f64; 4]>,
@@ -304,7 +341,8 @@ impl Request {
         if let ReferenceSpec::Named(EstimateSpec::Named(name)) = &self.streams.reference {
             files.push(PathBuf::from(name));
         }
-        files.extend(self.streams.times.iter().chain(&self.dataset.calibration).cloned());
+        let DatasetSpec { calibration, cloud, mesh, world_from_cloud, .. } = &self.dataset;
+        files.extend([calibration, cloud, mesh, world_from_cloud, &self.streams.times].into_iter().flatten().cloned());
         if let EstimateFrame::File(file) = &self.streams.estimate_frame {
             files.push(file.clone());
         }
@@ -318,6 +356,7 @@ impl Request {
     pub fn check(&self) -> RunResult<()> {
         self.protocol.check()?;
         self.depth.check(&[])?;
+        self.depth.check_scene(&self.dataset)?;
         self.streams.check_names()?;
         points_asked(&self.labels.file)?;
         if self.streams.max_gap < Span::ZERO {
@@ -373,6 +412,18 @@ impl DepthSpec {
     /// The sources that are asked: the floor where none is named.
     pub fn names(&self) -> Vec<DepthName> {
         if self.sources.is_empty() { vec![DepthName::Floor] } else { self.sources.clone() }
+    }
+
+    /// Refuses a mesh that no source looks at.
+    ///
+    /// # Errors
+    /// [`RunError`] of the kind usage.
+    pub fn check_scene(&self, dataset: &DatasetSpec) -> RunResult<()> {
+        if dataset.mesh.is_some() && !self.names().contains(&DepthName::Mesh) {
+            return Err(RunError::usage("mesh", "is of the depth source mesh, which is not asked")
+                .advise("add mesh to `depth`, or leave it out"));
+        }
+        Ok(())
     }
 
     /// Refuses settings of sources that nobody asks for, here or in `also`.
