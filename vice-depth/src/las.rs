@@ -22,7 +22,8 @@ pub(crate) fn read_points(file: File, length: Option<u64>, sink: &mut impl Point
     let promised = header.number_of_points();
     let format = header.point_format();
     // What compression saves is not known, and the promise then not believed.
-    let at_most = length.filter(|_| !format.is_compressed).map(|bytes| bytes / u64::from(format.len()).max(1));
+    let at_most =
+        length.filter(|_| !format.is_compressed).map(|bytes| bytes / u64::from(format.len()).max(1));
     let scales = [header.transforms().x, header.transforms().y, header.transforms().z];
     if let Some(scale) = scales.iter().map(|t| t.scale).find(|scale| !(scale.is_finite() && *scale > 0.0)) {
         return Err(DataError::new(format!("the header's scale of a coordinate is {scale}")));
@@ -32,7 +33,9 @@ pub(crate) fn read_points(file: File, length: Option<u64>, sink: &mut impl Point
     let mut found = 0;
     while found < promised {
         let count = (promised - found).min(PIECE_POINTS);
-        let got = checked(&format!("after {found} of {promised} points"), || reader.fill_points(count, &mut piece))?;
+        let got = checked(&format!("after {found} of {promised} points"), || {
+            reader.fill_points(count, &mut piece)
+        })?;
         if got == 0 {
             return Err(DataError::new(format!("the file ends after {found} of {promised} points")));
         }
@@ -48,7 +51,9 @@ pub(crate) fn read_points(file: File, length: Option<u64>, sink: &mut impl Point
 fn checked<T>(place: &str, decode: impl FnOnce() -> las::Result<T>) -> DataResult<T> {
     match catch_unwind(AssertUnwindSafe(decode)) {
         Ok(Ok(made)) => Ok(made),
-        Ok(Err(error)) => Err(DataError::new(format!("the LAS or LAZ file cannot be read: {place}")).because(error)),
+        Ok(Err(error)) => {
+            Err(DataError::new(format!("the LAS or LAZ file cannot be read: {place}")).because(error))
+        }
         Err(_) => Err(DataError::new(format!("the LAS or LAZ file cannot be decoded: {place}"))
             .hint("its bytes are damaged; copy it again, or repack it with laszip")),
     }
@@ -107,7 +112,8 @@ mod tests {
                 damaged[place] ^= 0xff;
                 std::fs::write(&path, &damaged).unwrap();
                 // An error or other points, but an answer.
-                let _ = read_scan_points(&path, &CloudOptions { max_bytes: Some(1 << 26), ..Default::default() });
+                let _ =
+                    read_scan_points(&path, &CloudOptions { max_bytes: Some(1 << 26), ..Default::default() });
             }
         }
     }

@@ -14,12 +14,20 @@ use crate::ply::PointSink;
 use header::{Data, Header};
 
 /// Reads the points of a PCD file, metres.
-pub(crate) fn read_points(reader: impl Read, length: Option<u64>, sink: &mut impl PointSink) -> DataResult<()> {
+pub(crate) fn read_points(
+    reader: impl Read,
+    length: Option<u64>,
+    sink: &mut impl PointSink,
+) -> DataResult<()> {
     let mut source = crate::ply::Source::new(reader, length);
     let header = Header::read(&mut source)?;
     let at_most = match header.data {
         Data::Binary => source.remaining().map(|bytes| bytes / header.point_bytes.max(1) as u64),
-        _ => None,
+        // A run of three bytes makes 264 at most.
+        Data::Compressed => {
+            source.remaining().map(|bytes| bytes.saturating_mul(88) / header.point_bytes.max(1) as u64)
+        }
+        Data::Ascii => None,
     };
     sink.expect(header.points, at_most)?;
     match header.data {

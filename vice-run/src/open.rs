@@ -91,6 +91,16 @@ impl DatasetSpec {
     ) -> RunResult<Opened> {
         let name = self.camera_name(dataset.as_ref())?;
         let mut calibrated = Calibrated::new(Arc::clone(&dataset));
+        let others = dataset.cameras().into_iter().filter(|other| *other != name);
+        for (other, file) in others.filter_map(|other| Some((other, calibration.as_ref()?))) {
+            // A second camera, where the file has an entry of that very name.
+            if let Some(camera) = file.camera(&other, dataset.camera(&other).ok().as_ref())? {
+                calibrated = calibrated.with_camera(&other, camera);
+            }
+            if let Some(body_from_camera) = file.body_from_camera(&other) {
+                calibrated = calibrated.with_body_from_camera(&other, body_from_camera);
+            }
+        }
         let calibration = calibration
             .map(|file| file.for_camera(&name, &dataset.cameras()))
             .transpose()
@@ -174,7 +184,8 @@ impl DatasetSpec {
             _ => None,
         };
         if placed.is_some() && cloud.is_none() && mesh.is_none() && own.is_none() {
-            return Err(RunError::usage("world-from-cloud", "places a cloud, and there is none").advise("add `cloud`"));
+            return Err(RunError::usage("world-from-cloud", "places a cloud, and there is none")
+                .advise("add `cloud`"));
         }
         if let Some(cloud) = cloud.or(own) {
             calibrated = calibrated.with_cloud(cloud);

@@ -11,6 +11,7 @@ use vice_depth::{
     load_cloud,
 };
 use vice_detect::{TagDepth, TagOptions};
+use vice_track::StereoDepth;
 
 use crate::error::{RunError, RunResult};
 use crate::open::Opened;
@@ -90,6 +91,10 @@ impl DepthSpec {
                 };
                 Ok(Box::new(MeshDepth::new(Arc::new(Mesh::read(path)?), reference.world_from_cloud)))
             }
+            DepthName::Stereo => {
+                let second = self.second_camera(dataset.as_ref(), camera)?;
+                Ok(Box::new(StereoDepth::new(Arc::clone(dataset), camera, &second)?))
+            }
             DepthName::Tag => {
                 let size_m = self.tag_size_m.ok_or_else(|| {
                     RunError::usage("depth", "tag: how large the tags are is not known")
@@ -98,6 +103,23 @@ impl DepthSpec {
                 let options = TagOptions { family: self.tag_family.unwrap_or_default(), border: None };
                 Ok(Box::new(TagDepth::new(Arc::clone(dataset), camera, options, size_m)?))
             }
+        }
+    }
+
+    /// The second camera of the pair.
+    fn second_camera(&self, dataset: &dyn Dataset, first: &str) -> RunResult<String> {
+        let others: Vec<String> = dataset.cameras().into_iter().filter(|name| name != first).collect();
+        match (&self.stereo_camera, others.as_slice()) {
+            (Some(name), _) => Ok(name.clone()),
+            (None, [only]) => Ok(only.clone()),
+            (None, []) => Err(RunError::missing(format!(
+                "{} has one camera, and the depth source stereo needs two",
+                dataset.name()
+            ))),
+            (None, several) => Err(RunError::usage(
+                "stereo-camera",
+                format!("could be {}; name the second camera of the pair", several.join(", ")),
+            )),
         }
     }
 

@@ -44,7 +44,7 @@ pub fn is_field(text: &str) -> bool {
 }
 
 /// Fields that have an option of the same name.
-const FIELDS: [&str; 44] = [
+const FIELDS: [&str; 45] = [
     "add",
     "align",
     "allow-writable-plugin",
@@ -84,6 +84,7 @@ const FIELDS: [&str; 44] = [
     "reference",
     "set",
     "start",
+    "stereo-camera",
     "tag-size",
     "time-offset",
     "world-from-cloud",

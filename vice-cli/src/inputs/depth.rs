@@ -59,6 +59,9 @@ pub(crate) struct DepthArgs {
     /// Family of the tags for the depth source tag: 36h11, 25h9 or 16h5 [default: 36h11].
     #[arg(long, value_name = "FAMILY")]
     tag_family: Option<TagFamily>,
+    /// Second camera for the depth source stereo [default: the only other one].
+    #[arg(long, value_name = "NAME")]
+    stereo_camera: Option<String>,
     /// Scan of the scene in place of the data set's: PLY, PCD, LAS or LAZ, metres.
     #[arg(long, value_name = "FILE")]
     cloud: Option<PathBuf>,
@@ -76,7 +79,7 @@ pub(crate) struct DepthArgs {
 /// Depth sources by name.
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct SourceArgs {
-    /// Depth sources: floor, zmap, zcam, mesh, tag.
+    /// Depth sources: floor, zmap, zcam, mesh, tag, stereo.
     #[arg(long, value_name = "SOURCE,...", required = true)]
     source: Vec<String>,
 }
@@ -116,6 +119,7 @@ impl DepthArgs {
             zcam_range_m: self.zcam_range,
             tag_size_m: self.tag_size,
             tag_family: self.tag_family,
+            stereo_camera: self.stereo_camera.clone(),
             compare: None,
         })
     }

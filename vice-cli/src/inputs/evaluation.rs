@@ -9,7 +9,7 @@ use vice_run::request::{LabelsSpec, Protocol, Request, Scoring};
 use super::{DatasetArgs, DepthArgs, StreamArgs, positive, span_not_negative, split_list};
 
 /// What a request in a file takes the place of.
-pub(crate) const ASKED: [&str; 38] = [
+pub(crate) const ASKED: [&str; 39] = [
     "path",
     "format",
     "settings",
@@ -40,6 +40,7 @@ pub(crate) const ASKED: [&str; 38] = [
     "zcam_range",
     "tag_size",
     "tag_family",
+    "stereo_camera",
     "cloud",
     "mesh",
     "world_from_cloud",
@@ -70,7 +71,7 @@ pub(crate) struct EvaluationArgs {
     window: WindowArgs,
     #[command(flatten)]
     streams: StreamArgs,
-    /// Depth sources: floor, zmap, zcam, mesh, tag [default: floor].
+    /// Depth sources: floor, zmap, zcam, mesh, tag, stereo [default: floor].
     #[arg(long, value_name = "SOURCE,...", help_heading = "Depth")]
     depth: Vec<String>,
     #[command(flatten)]

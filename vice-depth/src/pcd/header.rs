@@ -97,7 +97,9 @@ impl Header {
                 text.parse::<u64>()
                     .map_err(|_| DataError::new(format!("{key} {text} is no whole number")).line(lines))
             };
-            let one = || rest.first().copied().ok_or_else(|| DataError::new(format!("{key} says nothing")).line(lines));
+            let one = || {
+                rest.first().copied().ok_or_else(|| DataError::new(format!("{key} says nothing")).line(lines))
+            };
             match key {
                 "VERSION" | "VIEWPOINT" => {}
                 "FIELDS" | "COLUMNS" => fields = rest.iter().map(|f| (*f).to_string()).collect(),
@@ -132,13 +134,17 @@ impl Header {
                             ));
                         }
                         (Some(points), _) | (None, Some(points)) => points,
-                        (None, None) => return Err(DataError::new("the header has neither POINTS nor WIDTH and HEIGHT")),
+                        (None, None) => {
+                            return Err(DataError::new("the header has neither POINTS nor WIDTH and HEIGHT"));
+                        }
                     };
                     let counts = counts.unwrap_or_else(|| vec![1; fields.len()]);
                     return Self::new(&fields, &sizes, &types, &counts, points, data, lines);
                 }
                 other => {
-                    return Err(DataError::new(format!("`{}` is no line of a PCD header", shown(other))).line(lines));
+                    return Err(
+                        DataError::new(format!("`{}` is no line of a PCD header", shown(other))).line(lines)
+                    );
                 }
             }
         }
@@ -174,7 +180,9 @@ impl Header {
                     ("I", 1 | 2 | 4 | 8) => Scalar::Signed(size),
                     ("U", 1 | 2 | 4 | 8) => Scalar::Unsigned(size),
                     (kind, _) => {
-                        return Err(DataError::new(format!("the field {name} has TYPE {kind} and SIZE {size}")));
+                        return Err(DataError::new(format!(
+                            "the field {name} has TYPE {kind} and SIZE {size}"
+                        )));
                     }
                 };
                 if count != 1 {

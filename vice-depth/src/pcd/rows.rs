@@ -8,45 +8,45 @@ use super::header::{Axis, Header, Scalar, next_line};
 use super::{ends_early, lzf};
 use crate::ply::{PointSink, Source};
 
-/// Numbers that PCL writes where there is none.
-fn number(word: &str) -> Option<f64> {
-    word.parse().ok()
-}
-
-pub(super) fn text<R: Read>(source: &mut Source<R>, header: &Header, sink: &mut impl PointSink) -> DataResult<()> {
-    let single = header.axes.iter().all(|axis| axis.scalar == Scalar::F32);
+pub(super) fn text<R: Read>(
+    source: &mut Source<R>,
+    header: &Header,
+    sink: &mut impl PointSink,
+) -> DataResult<()> {
     let mut line = header.lines;
     let mut found = 0;
     while found < header.points {
         line += 1;
         let Some(row) = next_line(source).map_err(|e| e.line(line))? else {
-            return Err(DataError::new(format!("the file ends after {found} of {} points", header.points)).line(line));
+            return Err(
+                DataError::new(format!("the file ends after {found} of {} points", header.points)).line(line)
+            );
         };
         if row.trim().is_empty() {
             continue;
         }
         let words: Vec<&str> = row.split_whitespace().collect();
         if words.len() != header.words {
-            return Err(DataError::new(format!("the row has {} numbers, not {}", words.len(), header.words)).line(line));
+            return Err(DataError::new(format!("the row has {} numbers, not {}", words.len(), header.words))
+                .line(line));
         }
         let mut point = [0.0; 3];
         for (value, axis) in point.iter_mut().zip(&header.axes) {
             let word = words[axis.word];
-            *value = number(word).ok_or_else(|| DataError::new(format!("`{word}` is no number")).line(line))?;
+            *value = word.parse().map_err(|_| DataError::new(format!("`{word}` is no number")).line(line))?;
         }
         found += 1;
-        // What was written as a float may have more digits than one holds, as coordinates of a map do.
-        let fits = |v: f64| v.abs() < 1e4 || !v.is_finite() || f64::from(v as f32) == v;
-        if single && point.iter().all(|v| fits(*v)) {
-            sink.single(point.map(|v| v as f32))?;
-        } else {
-            sink.double(point)?;
-        }
+        // What is written as text has more digits than a float holds, as coordinates of a map do.
+        sink.double(point)?;
     }
     Ok(())
 }
 
-pub(super) fn binary<R: Read>(source: &mut Source<R>, header: &Header, sink: &mut impl PointSink) -> DataResult<()> {
+pub(super) fn binary<R: Read>(
+    source: &mut Source<R>,
+    header: &Header,
+    sink: &mut impl PointSink,
+) -> DataResult<()> {
     let size = header.point_bytes;
     let single = header.axes.iter().all(|axis| axis.scalar == Scalar::F32);
     let [x, y, z] = header.axes.map(|axis| axis.offset);
@@ -87,7 +87,9 @@ struct Column {
 impl Column {
     fn new(axis: Axis, points: u64) -> DataResult<Self> {
         let places = |bytes: usize| {
-            points.checked_mul(bytes as u64).ok_or_else(|| DataError::new(format!("{points} points are no cloud")))
+            points
+                .checked_mul(bytes as u64)
+                .ok_or_else(|| DataError::new(format!("{points} points are no cloud")))
         };
         let start = places(axis.offset)?;
         let end = start.saturating_add(places(axis.scalar.bytes())?);
@@ -137,7 +139,8 @@ impl Column {
     }
 }
 
-/// All x, then all y, then all z, and so on, compressed as one.
+/// All x, then all y, then all z, and so on, compressed as one: the coordinates are held a second time until they are
+/// together.
 pub(super) fn compressed<R: Read>(
     source: &mut Source<R>,
     header: &Header,
@@ -160,8 +163,10 @@ pub(super) fn compressed<R: Read>(
         .byte(at));
     }
     if source.remaining().is_some_and(|left| left < packed) {
-        return Err(DataError::new(format!("{packed} bytes of compressed points are announced, and the file ends"))
-            .byte(at));
+        return Err(DataError::new(format!(
+            "{packed} bytes of compressed points are announced, and the file ends"
+        ))
+        .byte(at));
     }
     let mut columns = Vec::with_capacity(3);
     for axis in header.axes {

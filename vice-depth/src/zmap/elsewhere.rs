@@ -30,9 +30,13 @@ impl Nearest {
         let [low, high] = cloud.bounds_m();
         let width_m = (high - low).norm();
         (nearest_m > NEAR_M.max(width_m)).then(|| {
-            Suspicion::new("cloud-elsewhere", "the cloud", "no key frame is near the points: another frame or unit?")
-                .evidence(format!("the nearest is {nearest_m:.1} m away, and the cloud is {width_m:.1} m wide"))
-                .advice("place it with `world-from-cloud`, or convert it to metres")
+            Suspicion::new(
+                "cloud-elsewhere",
+                "the cloud",
+                "no key frame is near the points: another frame or unit?",
+            )
+            .evidence(format!("the nearest is {nearest_m:.1} m away, and the cloud is {width_m:.1} m wide"))
+            .advice("place it with `world-from-cloud`, or convert it to metres")
         })
     }
 }

@@ -28,11 +28,11 @@ use vice_core::frames::{self, Rigid, World};
 use vice_core::suspicion::Suspicion;
 
 use crate::cloud::Cloud;
+use elsewhere::Nearest;
 use interpolate::{Local, Surface};
 use occlude::Occlusion;
 use queries::Queries;
 use select::{Seen, View, Window};
-use elsewhere::Nearest;
 use triangle::Limits;
 
 /// More pixels than this are answered by triangulating the whole image.

@@ -98,7 +98,7 @@ OPTIONS = """
         What places the camera in the world for depth: ``reference``, ``estimate``, or the name of a stream.
     initial_pose : (x, y, z, qx, qy, qz, qw), optional
         Pose ``world_from_body`` of the anchoring estimate at the first key frame, metres.
-    zmap_occlusion, zmap_interpolation, cloud_voxel, zcam_range, tag_size, tag_family, depth_check, subsets, align
+    zmap_occlusion, zmap_interpolation, cloud_voxel, zcam_range, tag_size, tag_family, stereo_camera, depth_check, subsets, align
         As the options of ``vice evaluate`` of these names.
 """
 
@@ -134,6 +134,7 @@ def request_text(
     zcam_range: Sequence[float] | None = None,
     tag_size: float | None = None,
     tag_family: str | None = None,
+    stereo_camera: str | None = None,
     depth_check: bool | None = None,
     subsets: int | Sequence[int] | None = None,
     align: str | None = None,
@@ -176,6 +177,7 @@ def request_text(
                 "zcam_range_m": _numbers(zcam_range),
                 "tag_size_m": _number(tag_size),
                 "tag_family": tag_family,
+                "stereo_camera": stereo_camera,
                 "compare": depth_check,
             }
         ),

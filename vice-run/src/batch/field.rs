@@ -53,7 +53,7 @@ enum Kind {
 }
 
 /// Options, where they stand in a request, and what they hold.
-const FIELDS: [(&str, &str, Kind); 39] = [
+const FIELDS: [(&str, &str, Kind); 40] = [
     ("dataset", "dataset.path", Kind::Text),
     ("format", "dataset.format", Kind::Text),
     ("set", "dataset.set", Kind::Settings),
@@ -91,6 +91,7 @@ const FIELDS: [(&str, &str, Kind); 39] = [
     ("zcam-range", "depth.zcam_range_m", Kind::Numbers),
     ("tag-size", "depth.tag_size_m", Kind::Number),
     ("tag-family", "depth.tag_family", Kind::Text),
+    ("stereo-camera", "depth.stereo_camera", Kind::Text),
     ("depth-check", "depth.compare", Kind::Switch),
     ("subsets", "scoring.subsets", Kind::Counts),
 ];

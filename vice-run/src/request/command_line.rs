@@ -70,6 +70,7 @@ fn options(request: &Request) -> Vec<(&'static str, String)> {
     add("zcam-range", depth.zcam_range_m.and_then(|r| numbers(&r)));
     add("tag-size", depth.tag_size_m.map(|v| v.to_string()));
     add("tag-family", depth.tag_family.map(|f| f.name().to_string()));
+    add("stereo-camera", depth.stereo_camera.clone());
     add("depth-check", depth.compare.map(|on| if on { "on" } else { "off" }.to_string()));
     add("subsets", list(scoring.subsets.iter().map(usize::to_string).collect()));
     add("align", scoring.align.map(|a| a.name().to_string()));

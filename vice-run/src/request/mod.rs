@@ -279,6 +279,9 @@ pub struct DepthSpec {
     /// Family of the tags; `None`: 36h11.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tag_family: Option<TagFamily>,
+    /// Second camera of the pair for the depth source stereo; `None`: the only other one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stereo_camera: Option<String>,
     /// Whether the depths at the key frames are compared with what a depth camera or scan of the recording says, where
     /// these are not asked for themselves; `None`: yes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -342,7 +345,9 @@ impl Request {
             files.push(PathBuf::from(name));
         }
         let DatasetSpec { calibration, cloud, mesh, world_from_cloud, .. } = &self.dataset;
-        files.extend([calibration, cloud, mesh, world_from_cloud, &self.streams.times].into_iter().flatten().cloned());
+        files.extend(
+            [calibration, cloud, mesh, world_from_cloud, &self.streams.times].into_iter().flatten().cloned(),
+        );
         if let EstimateFrame::File(file) = &self.streams.estimate_frame {
             files.push(file.clone());
         }
@@ -431,7 +436,7 @@ impl DepthSpec {
     /// # Errors
     /// [`RunError`] of the kind usage.
     pub fn check(&self, also: &[DepthName]) -> RunResult<()> {
-        use DepthName::{Tag, ZCam, ZMap};
+        use DepthName::{Stereo, Tag, ZCam, ZMap};
         let settings = [
             ("zmap-occlusion", self.zmap_occlusion.is_some(), ZMap),
             ("zmap-interpolation", self.zmap_interpolation.is_some(), ZMap),
@@ -439,6 +444,7 @@ impl DepthSpec {
             ("zcam-range", self.zcam_range_m.is_some(), ZCam),
             ("tag-size", self.tag_size_m.is_some(), Tag),
             ("tag-family", self.tag_family.is_some(), Tag),
+            ("stereo-camera", self.stereo_camera.is_some(), Stereo),
         ];
         let names = self.names();
         for (field, given, source) in settings {

@@ -114,8 +114,9 @@ impl DatasetSpec {
 fn place(numbers: &[f64]) -> RunResult<BodyFromCamera> {
     let wrong = |e: String| RunError::usage("body-from-camera", e);
     match *numbers {
-        [x, y, z, qx, qy, qz, qw] => BodyFromCamera::try_from_parts([x, y, z], [qw, qx, qy, qz])
-            .map_err(|e| wrong(e.to_string())),
+        [x, y, z, qx, qy, qz, qw] => {
+            BodyFromCamera::try_from_parts([x, y, z], [qw, qx, qy, qz]).map_err(|e| wrong(e.to_string()))
+        }
         _ => match <[f64; 16]>::try_from(numbers) {
             Ok(matrix) => BodyFromCamera::try_from_row_major(&matrix).map_err(|e| wrong(e.to_string())),
             Err(_) => Err(wrong(format!(
@@ -156,7 +157,8 @@ mod tests {
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let pose = place(&[1.0, 2.0, 3.0, 0.0, 0.0, half, half]).unwrap();
         let matrix =
-            place(&[0.0, -1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 1.0, 3.0, 0.0, 0.0, 0.0, 1.0]).unwrap();
+            place(&[0.0, -1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 1.0, 3.0, 0.0, 0.0, 0.0, 1.0])
+                .unwrap();
         let off = pose.inverse() * matrix;
         assert!(off.translation().norm() < 1e-12 && off.rotation().angle() < 1e-12);
         assert!(place(&[1.0]).unwrap_err().to_string().contains("1 numbers are no pose"));
