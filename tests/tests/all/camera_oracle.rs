@@ -2,6 +2,7 @@
 
 use nalgebra::Point3;
 use vice_core::camera::{Camera, Model, Pixel};
+use vice_files::calibration::CalibrationFile;
 
 #[test]
 fn cameras_agree_with_opencv() {
@@ -80,6 +81,37 @@ fn wide_lenses_agree_with_their_papers() {
         }
         for px in rows(&case["pixels_without_ray"]) {
             assert!(camera.unproject(Pixel::new(px[0], px[1])).is_err(), "{name}: {px:?}");
+        }
+    }
+}
+
+/// COLMAP's (0, 0) is the corner of the top left pixel.
+#[test]
+fn cameras_that_colmap_wrote_project_as_it_does() {
+    let oracle: serde_json::Value =
+        serde_json::from_str(include_str!("../../oracles/colmap_cameras.json")).unwrap();
+    let numbers = |v: &serde_json::Value| -> Vec<f64> {
+        v.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+    };
+    let points: Vec<Vec<f64>> = oracle["points_camera_m"].as_array().unwrap().iter().map(numbers).collect();
+    let cases = oracle["cases"].as_array().unwrap();
+    assert_eq!(cases.len(), 13);
+    for case in cases {
+        let model = case["model"].as_str().unwrap();
+        let text = case["cameras_bin"].as_str().unwrap();
+        let bytes: Vec<u8> =
+            (0..text.len()).step_by(2).map(|i| u8::from_str_radix(&text[i..i + 2], 16).unwrap()).collect();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cameras.bin");
+        std::fs::write(&path, bytes).unwrap();
+        let file = CalibrationFile::read(&path).unwrap().for_camera("cam0", &["cam0".to_string()]).unwrap();
+        let camera = file.camera("cam0", None).unwrap().unwrap();
+        assert_eq!((camera.width(), camera.height()), (640, 480), "{model}");
+        for (point, pixel) in points.iter().zip(case["pixels_colmap"].as_array().unwrap()) {
+            let px = numbers(pixel);
+            let got = camera.project(&Point3::new(point[0], point[1], point[2])).unwrap();
+            let off = got.distance_px(Pixel::new(px[0] - 0.5, px[1] - 0.5));
+            assert!(off < 1e-9, "{model}: {point:?} is {off:e} px off");
         }
     }
 }

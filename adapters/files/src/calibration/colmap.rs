@@ -22,7 +22,7 @@ const fn model(name: &'static str, parameters: usize, ours: Option<&'static str>
 }
 
 /// In the order of their numbers in binary files.
-const MODELS: [Model; 14] = [
+const MODELS: [Model; 18] = [
     model("SIMPLE_PINHOLE", 3, Some("pinhole"), true),
     model("PINHOLE", 4, Some("pinhole"), false),
     model("SIMPLE_RADIAL", 4, Some("radtan"), true),
@@ -37,6 +37,10 @@ const MODELS: [Model; 14] = [
     model("RAD_TAN_THIN_PRISM_FISHEYE", 16, None, false),
     model("SIMPLE_DIVISION", 4, None, true),
     model("DIVISION", 5, None, false),
+    model("SIMPLE_FISHEYE", 3, Some("equidistant"), true),
+    model("FISHEYE", 4, Some("equidistant"), false),
+    model("EUCM", 6, Some("eucm"), false),
+    model("EQUIRECTANGULAR", 2, None, false),
 ];
 
 /// Bytes of a camera in a binary file before its parameters.
