@@ -20,12 +20,16 @@ use vice_core::random::Congruential;
 use vice_core::track::track_batch;
 use vice_depth::FloorDepth;
 
-fn models() -> [(&'static str, Camera); 4] {
-    let models: [(&str, &[f64]); 4] = [
+fn models() -> [(&'static str, Camera); 8] {
+    let models: [(&str, &[f64]); 8] = [
         ("pinhole", &[]),
         ("radtan", &[-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]),
         ("rational", &[0.35, 0.12, 0.0004, -0.0007, 0.01, 0.62, 0.2, 0.02]),
         ("equidistant", &[0.0034823894, 0.00071503484, -0.0020532361, 0.00020293673]),
+        ("ds", &[-0.18, 0.59]),
+        ("eucm", &[0.63, 1.04]),
+        ("omni", &[0.9, -0.2, 0.05, 0.0005, -0.0003]),
+        ("fov", &[0.93]),
     ];
     models.map(|(name, c)| {
         let model = Model::from_name(name, c).unwrap();

@@ -10,12 +10,12 @@ use std::time::Duration;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use ply_rs::parser::Parser;
 use ply_rs::ply::DefaultElement;
-use vice_depth::{CloudOptions, read_ply_points};
+use vice_depth::{CloudOptions, read_scan_points};
 
 const PROPERTIES: &str = "property float x\nproperty float y\nproperty float z\nend_header\n";
 
 fn points(path: &Path) -> usize {
-    read_ply_points(path, &CloudOptions::default()).unwrap().points.len()
+    read_scan_points(path, &CloudOptions::default()).unwrap().points.len()
 }
 
 fn ply(c: &mut Criterion) {

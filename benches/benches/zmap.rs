@@ -19,7 +19,7 @@ use vice_depth::{Cloud, CloudOptions, ZMapDepth, ZMapOptions, depth_image};
 /// What the peers do: the EuRoC cloud before a pinhole camera, 752x480.
 fn euroc(c: &mut Criterion) {
     let Some(path) = shared("data/euroc_v1_01/mav0/pointcloud0/data.ply") else { return };
-    let cloud = Arc::new(Cloud::read_ply(path, &CloudOptions::default()).unwrap());
+    let cloud = Arc::new(Cloud::read(path, &CloudOptions::default()).unwrap());
     let camera = Camera::new(752, 480, [458.654, 457.296, 367.215, 248.375], Model::Pinhole).unwrap();
     // OpenCV's rotation vector and translation take the world to the camera.
     let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(1.2, -1.2, 1.2));

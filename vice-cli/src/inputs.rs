@@ -12,7 +12,7 @@ use vice_run::core::time::Span;
 use vice_run::files::atomic::{self, Overwrite};
 
 pub(crate) use dataset::{Counted, DatasetArgs, PluginArgs, counted_spec, setting};
-pub(crate) use depth::{AnchorArgs, DepthArgs, SourceArgs, on_off};
+pub(crate) use depth::{AnchorArgs, CalibrationArgs, DepthArgs, SourceArgs, on_off};
 #[cfg(test)]
 pub(crate) use evaluation::ASKED;
 pub(crate) use evaluation::{EvaluationArgs, LabelArgs, WindowArgs};
@@ -40,15 +40,21 @@ pub(crate) fn positive(text: &str) -> Result<f64, String> {
 
 /// Exactly `N` numbers separated by commas.
 pub(crate) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let values = numbers_any(text)?;
+    let got = values.len();
+    values.try_into().map_err(|_| format!("{N} numbers separated by commas are expected, got {got}"))
+}
+
+/// Numbers separated by commas.
+pub(crate) fn numbers_any(text: &str) -> Result<Vec<f64>, String> {
     let values: Vec<f64> = text
         .split(',')
         .map(|part| part.trim().parse::<f64>().map_err(|e| format!("`{part}`: {e}")))
         .collect::<Result<_, _>>()?;
-    if !values.iter().all(|v| v.is_finite()) {
-        return Err("all numbers must be finite".to_string());
+    match values.iter().all(|v| v.is_finite()) {
+        true => Ok(values),
+        false => Err("all numbers must be finite".to_string()),
     }
-    let got = values.len();
-    values.try_into().map_err(|_| format!("{N} numbers separated by commas are expected, got {got}"))
 }
 
 /// Lists repeat the option or take commas; a value that is a file keeps its commas.

@@ -105,11 +105,14 @@ pub enum DepthMiss {
     /// The pixel lies on no calibration target whose pose is known.
     #[error("the pixel lies on no calibration target whose pose is known")]
     NoTarget,
+    /// No place of the second camera's image is surely the same.
+    #[error("no place of the second camera's image is surely the same")]
+    NoMatch,
 }
 
 /// Something that knows the depth of pixels at key frames.
 pub trait DepthSource: Send + Sync {
-    /// Name in tables and documents: `floor`, `zmap`, `zcam`, `mesh`, `tag`.
+    /// Name in tables and documents: `floor`, `zmap`, `zcam`, `mesh`, `tag`, `stereo`.
     fn name(&self) -> &str;
 
     /// Depths of pixels of one key frame, in their order. Asked once for all pixels of a key frame, since what can be

@@ -47,7 +47,7 @@ pub enum SkipReason {
 
 impl SkipReason {
     /// All reasons.
-    const ALL: [Self; 27] = [
+    const ALL: [Self; 28] = [
         Self::NoFrame,
         Self::KeyframeNoFrame,
         Self::BeforeFirstKeyframe,
@@ -75,6 +75,7 @@ impl SkipReason {
         Self::NoDepth(DepthMiss::OutOfRange),
         Self::NoDepth(DepthMiss::NoSurface),
         Self::NoDepth(DepthMiss::NoTarget),
+        Self::NoDepth(DepthMiss::NoMatch),
     ];
 
     /// Whether somebody left the label out on purpose: no gap in the data.
@@ -118,6 +119,7 @@ impl SkipReason {
                 DepthMiss::OutOfRange => "keyframe-depth-out-of-range",
                 DepthMiss::NoSurface => "keyframe-no-surface",
                 DepthMiss::NoTarget => "keyframe-no-target",
+                DepthMiss::NoMatch => "keyframe-no-match",
             },
         }
     }

@@ -52,7 +52,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             path
         }
     };
-    let cloud = Cloud::read_ply(&path, &CloudOptions::default())?;
+    let cloud = Cloud::read(&path, &CloudOptions::default())?;
     let zmap = ZMapDepth::new(Arc::new(cloud), Rigid::identity(), ZMapOptions::default());
 
     let camera = Camera::new(320, 240, [250.0, 250.0, 160.0, 120.0], Model::Pinhole)?;

@@ -56,7 +56,7 @@ impl Mesh {
     /// # Errors
     /// [`DataError`] with the byte or line if the file cannot be used, has no faces, or a face names a vertex that
     /// does not exist or is not finite.
-    pub fn read_ply(path: impl AsRef<Path>) -> DataResult<Self> {
+    pub fn read(path: impl AsRef<Path>) -> DataResult<Self> {
         let path = path.as_ref();
         let (mut corners, mut faces) = (Corners::default(), Vec::new());
         ply::read_mesh(path, &mut corners, |face| {

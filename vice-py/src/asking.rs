@@ -46,10 +46,12 @@ impl Asked {
             serde_json::from_value(value).map_err(|e| usage("request", e.to_string()))?;
         let over = request.dataset;
         request.dataset = DatasetSpec {
-            camera: over.camera.or_else(|| run.spec.camera.clone()),
-            calibration: over.calibration,
-            floor_plane: over.floor_plane,
-            ..run.spec.clone()
+            camera: over.camera.clone().or_else(|| run.spec.camera.clone()),
+            path: run.spec.path.clone(),
+            format: run.spec.format.clone(),
+            set: run.spec.set.clone(),
+            plugins: run.spec.plugins.clone(),
+            ..over
         };
         let mut memory = InMemory::default();
         request.labels.file = match labels.cast::<Labels>() {
@@ -77,8 +79,9 @@ impl Asked {
     }
 
     fn open(&self) -> RunResult<Opened> {
-        let opened = self.request.dataset.apply_to(Arc::clone(&self.dataset))?;
-        Ok(Opened { in_memory: self.memory.clone(), ..opened })
+        let mut opened = self.request.dataset.apply_to(Arc::clone(&self.dataset))?;
+        opened.in_memory = self.memory.clone();
+        Ok(opened)
     }
 }
 

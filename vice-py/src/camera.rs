@@ -17,9 +17,11 @@ use crate::work::guarded;
 /// K : array of shape (3, 3), or (fx, fy, cx, cy)
 ///     Intrinsics in pixels; pixel centres are integers. A skew is refused.
 /// model : str
-///     ``pinhole``, ``radtan`` (``plumb_bob``), ``rational`` (``rational_polynomial``), ``equidistant`` (``fisheye``).
+///     ``pinhole``, ``radtan`` (``plumb_bob``), ``rational`` (``rational_polynomial``), ``equidistant`` (``fisheye``),
+///     ``ds`` (double sphere), ``eucm`` (extended unified), ``omni`` (Mei), ``fov`` (ATAN).
 /// D : sequence of float
-///     Coefficients of the lens in OpenCV's order: 4 or 5 of radtan, 8 of rational, 4 of equidistant.
+///     Coefficients of the lens in OpenCV's order: 4 or 5 of radtan, 8 of rational, 4 of equidistant;
+///     xi, alpha of ds; alpha, beta of eucm; xi, k1, k2, p1, p2 of omni; w of fov.
 ///
 /// Raises
 /// ------

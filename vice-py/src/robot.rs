@@ -282,7 +282,7 @@ impl Dataset for Robot {
             let world_from_cloud = Rigid::try_from_row_major(&matrix(&place, "cloud")?)
                 .map_err(|e| wrong("cloud", &e.to_string()))?;
             let source = match points.extract::<std::path::PathBuf>() {
-                Ok(path) => CloudSource::Ply(path),
+                Ok(path) => CloudSource::File(path),
                 Err(_) => {
                     let rows = Rows::of::<3>(&points, "cloud")?;
                     let points = rows.rows::<3>()?.iter().map(|p| Point3::from(p.map(|v| v as f32)));

@@ -85,6 +85,10 @@ impl Dataset for Away {
         self.place.told(self.inner.cloud())
     }
 
+    fn mesh(&self) -> DataResult<Option<CloudRef>> {
+        self.place.told(self.inner.mesh())
+    }
+
     fn floor(&self, keyframe: Stamp) -> DataResult<Floor> {
         self.place.told(self.inner.floor(keyframe))
     }

@@ -133,6 +133,13 @@ impl Beside {
         self.told.file.up.map(|up| up.turn())
     }
 
+    fn turned(&self, own: CloudRef) -> CloudRef {
+        match self.turn() {
+            Some(turn) => CloudRef { world_from_cloud: turn * own.world_from_cloud, ..own },
+            None => own,
+        }
+    }
+
     /// A stream in a file, as poses of the body, in the world that the file has.
     fn stream(&self, name: &str, cell: &OnceLock<TrajectoryFile>) -> DataResult<Trajectory> {
         let entry = &self.told.file.streams[name];
@@ -258,15 +265,16 @@ impl Dataset for Beside {
         // Its place is said in the world as it is used; that of the data set's own is turned with the poses.
         if let Some(path) = &self.told.file.cloud {
             let world_from_cloud = self.told.file.world_from_cloud.unwrap_or_else(Rigid::identity);
-            return Ok(Some(CloudRef { source: CloudSource::Ply(path.clone()), world_from_cloud }));
+            return Ok(Some(CloudRef { source: CloudSource::File(path.clone()), world_from_cloud }));
         }
-        let cloud = self.inner.cloud()?;
-        Ok(match (cloud, self.turn()) {
-            (Some(cloud), Some(turn)) => {
-                Some(CloudRef { world_from_cloud: turn * cloud.world_from_cloud, ..cloud })
-            }
-            (cloud, _) => cloud,
-        })
+        Ok(self.inner.cloud()?.map(|own| self.turned(own)))
+    }
+
+    fn mesh(&self) -> DataResult<Option<CloudRef>> {
+        match &self.told.file.cloud {
+            Some(_) => self.cloud(),
+            None => Ok(self.inner.mesh()?.map(|own| self.turned(own))),
+        }
     }
 
     fn floor(&self, keyframe: Stamp) -> DataResult<Floor> {

@@ -37,7 +37,7 @@ pub fn describe(dataset: &dyn Dataset, camera: Option<&str>) -> RunResult<String
     if let Some(cloud) = dataset.cloud()? {
         writeln!(text, "point cloud")?;
         match &cloud.source {
-            vice_core::dataset::CloudSource::Ply(path) => writeln!(text, "  {}", path.display())?,
+            vice_core::dataset::CloudSource::File(path) => writeln!(text, "  {}", path.display())?,
             vice_core::dataset::CloudSource::Points(points) => writeln!(text, "  {} points", points.len())?,
             _ => {}
         }

@@ -111,7 +111,7 @@ pub fn document(dataset: &dyn Dataset, camera: Option<&str>) -> InfoDocument {
     let cloud = match dataset.cloud() {
         Ok(None) => None,
         Ok(Some(cloud)) => Some(match cloud.source {
-            CloudSource::Ply(path) => path.display().to_string(),
+            CloudSource::File(path) => path.display().to_string(),
             CloudSource::Points(points) => format!("{} points", points.len()),
             _ => "a scan".to_string(),
         }),

@@ -4,15 +4,16 @@ use std::path::Path;
 use std::sync::Arc;
 
 use vice_core::camera::Camera;
-use vice_core::dataset::{Calibrated, Dataset, Floor, OpenOptions, Plane};
+use vice_core::dataset::{Calibrated, CloudRef, CloudSource, Dataset, Floor, OpenOptions, Plane};
 use vice_core::error::{DataError, ErrorKind};
 use vice_core::evaluate::{DatasetRig, Observations};
-use vice_core::frames::World;
+use vice_core::frames::{Rigid, World};
 use vice_core::registry::Registry;
 use vice_core::suspicion::Suspicion;
 use vice_core::time::{Span, Stamp};
 use vice_files::address::{self, is_address};
 use vice_files::calibration::CalibrationFile;
+use vice_files::rigid_file;
 
 use crate::away::Away;
 use crate::beside::{Told, calibrated};
@@ -42,6 +43,8 @@ pub struct Opened {
     pub scans: Option<Arc<Scans>>,
     /// Poses and labels that a request may name though no file holds them.
     pub in_memory: InMemory,
+    /// Files that were fetched from elsewhere, kept as long as they may be read.
+    staged: Arc<Vec<Place<'static>>>,
 }
 
 impl DatasetSpec {
@@ -105,6 +108,16 @@ impl DatasetSpec {
     ) -> RunResult<Opened> {
         let name = self.camera_name(dataset.as_ref())?;
         let mut overridden = Calibrated::new(Arc::clone(&dataset));
+        let others = dataset.cameras().into_iter().filter(|other| *other != name);
+        for (other, file) in others.filter_map(|other| Some((other, calibration.as_ref()?))) {
+            // A second camera, where the file has an entry of that very name.
+            if let Some(camera) = file.camera(&other, dataset.camera(&other).ok().as_ref())? {
+                overridden = overridden.with_camera(&other, camera);
+            }
+            if let Some(body_from_camera) = file.body_from_camera(&other) {
+                overridden = overridden.with_body_from_camera(&other, body_from_camera);
+            }
+        }
         let calibration = calibration
             .map(|file| file.for_camera(&name, &dataset.cameras()))
             .transpose()
@@ -121,6 +134,17 @@ impl DatasetSpec {
         if let Some(floor) = floor {
             overridden = overridden.with_floor(floor);
         }
+        let base = overridden.camera(&name).ok();
+        if let Some(plain) = self.plain_camera(base.as_ref())? {
+            let missing = |e: DataError| RunError::new(ErrorKind::Usage, "").because(e).of("intrinsics");
+            if let Some(camera) = plain.camera(base.as_ref()).map_err(missing)? {
+                overridden = overridden.with_camera(&name, camera);
+            }
+            if let Some(body_from_camera) = plain.body_from_camera {
+                overridden = overridden.with_body_from_camera(&name, body_from_camera);
+            }
+        }
+        let (overridden, staged) = self.scanned(dataset.as_ref(), overridden)?;
         let camera = overridden.camera(&name)?;
         let frames = overridden.frames(&name)?;
         tracing::info!(
@@ -139,7 +163,53 @@ impl DatasetSpec {
             told: self.told()?,
             scans: None,
             in_memory,
+            staged: Arc::new(staged),
         })
+    }
+
+    /// The scan and the faces that are given, in place of the data set's own, with the files that were fetched for them.
+    fn scanned(
+        &self,
+        dataset: &dyn Dataset,
+        mut calibrated: Calibrated,
+    ) -> RunResult<(Calibrated, Vec<Place<'static>>)> {
+        let mut staged = Vec::new();
+        let placed = match &self.world_from_cloud {
+            Some(file) => {
+                let place = Place::of_file(file)?;
+                Some(place.told(rigid_file::read_world_from_cloud(place.path()))?)
+            }
+            None => None,
+        };
+        let mut given = |file: &Path| -> RunResult<CloudRef> {
+            let place = Place::of_file(file)?;
+            if !place.path().is_file() {
+                return Err(RunError::missing(format!("{}: no such file", file.display())));
+            }
+            let source = CloudSource::File(place.path().to_path_buf());
+            staged.push(place.kept());
+            Ok(CloudRef { source, world_from_cloud: placed.unwrap_or_else(Rigid::identity) })
+        };
+        let cloud = self.cloud.as_deref().map(&mut given).transpose()?;
+        let mesh = self.mesh.as_deref().map(&mut given).transpose()?;
+        let moved = |own: Option<CloudRef>| {
+            own.zip(placed).map(|(own, placed)| CloudRef { world_from_cloud: placed, ..own })
+        };
+        let own = match (&cloud, placed) {
+            (None, Some(_)) => moved(dataset.cloud()?),
+            _ => None,
+        };
+        if placed.is_some() && cloud.is_none() && mesh.is_none() && own.is_none() {
+            return Err(RunError::usage("world-from-cloud", "places a cloud, and there is none")
+                .advise("add `cloud`"));
+        }
+        if let Some(cloud) = cloud.or(own) {
+            calibrated = calibrated.with_cloud(cloud);
+        }
+        if let Some(mesh) = mesh {
+            calibrated = calibrated.with_mesh(mesh);
+        }
+        Ok((calibrated, staged))
     }
 
     /// The name of the camera that was asked for, or the first.

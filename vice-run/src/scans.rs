@@ -48,7 +48,7 @@ impl Scans {
     /// As [`load_cloud`].
     pub fn load(&self, cloud: &CloudRef, options: &CloudOptions) -> DataResult<Arc<Cloud>> {
         let content = match &cloud.source {
-            CloudSource::Ply(path) => (self.identity)(path.as_path()),
+            CloudSource::File(path) => (self.identity)(path.as_path()),
             _ => None,
         };
         let Some(content) = content else { return load_cloud(cloud, options) };
@@ -107,7 +107,7 @@ mod tests {
     use vice_core::frames::Rigid;
 
     fn cloud(path: &Path) -> CloudRef {
-        CloudRef { source: CloudSource::Ply(path.to_path_buf()), world_from_cloud: Rigid::identity() }
+        CloudRef { source: CloudSource::File(path.to_path_buf()), world_from_cloud: Rigid::identity() }
     }
 
     fn ply(folder: &Path, name: &str, points: usize) -> PathBuf {
@@ -125,7 +125,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (small, large) = (ply(folder.path(), "s.ply", 10), ply(folder.path(), "l.ply", 1000));
         let options = CloudOptions::default();
-        let size = Cloud::read_ply(&large, &options).unwrap().bytes();
+        let size = Cloud::read(&large, &options).unwrap().bytes();
         let scans = Scans::new(size, unchanged_file);
         let load = |path: &Path, options: &CloudOptions| scans.load(&cloud(path), options).unwrap();
         let first = load(&small, &options);

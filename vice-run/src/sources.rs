@@ -11,6 +11,7 @@ use vice_depth::{
     load_cloud,
 };
 use vice_detect::{TagDepth, TagOptions};
+use vice_track::StereoDepth;
 
 use crate::error::{RunError, RunResult};
 use crate::open::Opened;
@@ -81,14 +82,18 @@ impl DepthSpec {
                 Ok(Box::new(ZCamDepth::new(Arc::clone(dataset), camera, options)?))
             }
             DepthName::Mesh => {
-                let reference = cloud_of(name, dataset.as_ref())?;
-                let CloudSource::Ply(path) = &reference.source else {
+                let reference = mesh_of(dataset.as_ref())?;
+                let CloudSource::File(path) = &reference.source else {
                     return Err(RunError::missing(format!(
                         "{}: the depth source mesh needs a PLY with faces",
                         dataset.name()
                     )));
                 };
-                Ok(Box::new(MeshDepth::new(Arc::new(Mesh::read_ply(path)?), reference.world_from_cloud)))
+                Ok(Box::new(MeshDepth::new(Arc::new(Mesh::read(path)?), reference.world_from_cloud)))
+            }
+            DepthName::Stereo => {
+                let second = self.second_camera(dataset.as_ref(), camera)?;
+                Ok(Box::new(StereoDepth::new(Arc::clone(dataset), camera, &second)?))
             }
             DepthName::Tag => {
                 let size_m = self.tag_size_m.ok_or_else(|| {
@@ -98,6 +103,23 @@ impl DepthSpec {
                 let options = TagOptions { family: self.tag_family.unwrap_or_default(), border: None };
                 Ok(Box::new(TagDepth::new(Arc::clone(dataset), camera, options, size_m)?))
             }
+        }
+    }
+
+    /// The second camera of the pair.
+    fn second_camera(&self, dataset: &dyn Dataset, first: &str) -> RunResult<String> {
+        let others: Vec<String> = dataset.cameras().into_iter().filter(|name| name != first).collect();
+        match (&self.stereo_camera, others.as_slice()) {
+            (Some(name), _) => Ok(name.clone()),
+            (None, [only]) => Ok(only.clone()),
+            (None, []) => Err(RunError::missing(format!(
+                "{} has one camera, and the depth source stereo needs two",
+                dataset.name()
+            ))),
+            (None, several) => Err(RunError::usage(
+                "stereo-camera",
+                format!("could be {}; name the second camera of the pair", several.join(", ")),
+            )),
         }
     }
 
@@ -116,9 +138,16 @@ impl DepthSpec {
     }
 }
 
+fn mesh_of(dataset: &dyn Dataset) -> RunResult<CloudRef> {
+    dataset.mesh()?.ok_or_else(|| {
+        RunError::missing(format!("{} has no mesh for the depth source mesh", dataset.name()))
+            .advise("give a PLY with faces with `mesh`, or use `depth` floor")
+    })
+}
+
 fn cloud_of(source: DepthName, dataset: &dyn Dataset) -> RunResult<CloudRef> {
     dataset.cloud()?.ok_or_else(|| {
         RunError::missing(format!("{} has no point cloud for the depth source {source}", dataset.name()))
-            .advise("use `depth` floor")
+            .advise("give a PLY, PCD, LAS or LAZ file with `cloud`, or use `depth` floor")
     })
 }

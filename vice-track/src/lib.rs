@@ -14,6 +14,7 @@
 //! | `suggest` | where to put new points |
 //! | [`two_view`] | whether many points moved as one rigid scene does |
 //! | [`auto`] | labels without a hand |
+//! | [`stereo`] | depth from a second camera |
 //!
 //! [`PointTrack`] is what labels are made with. [`track_translation`] is its first stage alone, for many points.
 //!
@@ -30,6 +31,7 @@ mod lucas_kanade;
 mod point_track;
 mod pyramid;
 mod sampler;
+pub mod stereo;
 mod suggest;
 #[cfg(test)]
 mod tests;
@@ -42,6 +44,7 @@ pub use lucas_kanade::track_translation;
 pub use point_track::{DOUBT_CONFIDENCE, Outcome, PointTrack, Step, TrackError, TrackOptions};
 pub use pyramid::Pyramid;
 pub use pyramid::WINDOW_PX;
+pub use stereo::StereoDepth;
 pub use suggest::{SuggestOptions, Suggestion, suggest};
 
 /// Name and version of the tracker, for the labels that it made. It changes whenever its results may.

@@ -211,7 +211,7 @@ impl Dataset for Sequence {
             return Ok(None);
         }
         let world_from_cloud = sensor::world_from_cloud(&folder)?;
-        Ok(Some(CloudRef { source: CloudSource::Ply(ply), world_from_cloud }))
+        Ok(Some(CloudRef { source: CloudSource::File(ply), world_from_cloud }))
     }
 
     fn suspicions(&self) -> Vec<Suspicion> {

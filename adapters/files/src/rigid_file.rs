@@ -10,7 +10,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 use vice_core::error::{DataError, DataResult};
-use vice_core::frames::{Body, Rigid, Sensor};
+use vice_core::frames::{Body, Cloud, Rigid, Sensor, World};
 
 use crate::yaml;
 
@@ -98,6 +98,62 @@ pub fn read(path: impl AsRef<Path>) -> DataResult<Rigid<Body, Sensor>> {
     rigid.map_err(|e| e.at(path))
 }
 
+#[derive(Deserialize)]
+struct CloudFile {
+    #[serde(alias = "T_world_cloud")]
+    world_from_cloud: Option<Matrix4>,
+    #[serde(rename = "T_WR")]
+    t_wr: Option<Matrix4>,
+}
+
+/// Reads `world_from_cloud`, which takes coordinates of a scan to the world: 4x4 numbers row by row (three rows do as
+/// well), a pose as a TUM file has it (x y z qx qy qz qw, a stamp before it is passed over), or TOML or YAML with that key.
+///
+/// # Errors
+/// [`DataError`] with the path if the file cannot be read, has no such transform, or it is not rigid.
+pub fn read_world_from_cloud(path: impl AsRef<Path>) -> DataResult<Rigid<World, Cloud>> {
+    let path = path.as_ref();
+    let text = yaml::read_text(path)?;
+    let rows = text.lines().map(str::trim).filter(|row| !row.is_empty() && !row.starts_with('#'));
+    let bare = rows.collect::<Vec<_>>().join("\n");
+    let rigid = match plain(&bare) {
+        Some(Matrix4::Flat(numbers)) => of_numbers(&numbers),
+        _ => {
+            let file: CloudFile =
+                if is_toml(path) { from_toml(&text) } else { yaml::parse(&text) }.map_err(|e| e.at(path))?;
+            match (file.world_from_cloud, file.t_wr) {
+                (Some(matrix), None) => matrix.to_rigid("world_from_cloud"),
+                (None, Some(matrix)) => matrix.to_rigid("T_WR"),
+                (Some(_), Some(_)) => Err(DataError::new("both world_from_cloud and T_WR are given")),
+                (None, None) => Err(DataError::new("no transform is given")
+                    .hint("world_from_cloud = [16 numbers, row by row], or x y z qx qy qz qw")),
+            }
+        }
+    };
+    rigid.map_err(|e| e.at(path))
+}
+
+/// A pose or a matrix as nothing but numbers.
+fn of_numbers(numbers: &[f64]) -> DataResult<Rigid<World, Cloud>> {
+    let pose = |n: &[f64]| {
+        Rigid::try_from_parts([n[0], n[1], n[2]], [n[6], n[3], n[4], n[5]])
+            .map_err(|e| DataError::new(format!("the pose: {e}")))
+    };
+    match numbers.len() {
+        7 => pose(numbers),
+        8 => pose(&numbers[1..]),
+        12 => {
+            let mut matrix = numbers.to_vec();
+            matrix.extend([0.0, 0.0, 0.0, 1.0]);
+            Matrix4::Flat(matrix).to_rigid("the matrix")
+        }
+        16 => Matrix4::Flat(numbers.to_vec()).to_rigid("the matrix"),
+        n => Err(DataError::new(format!(
+            "{n} numbers are neither a pose (x y z qx qy qz qw) nor a matrix of 3x4 or 4x4"
+        ))),
+    }
+}
+
 pub(crate) fn is_toml(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
 }
@@ -152,6 +208,39 @@ mod tests {
             assert_eq!(rigid.translation(), nalgebra::Vector3::new(0.5, -2.0, 0.3));
             let x = rigid.rotate(&[1.0, 0.0, 0.0].into());
             assert!((x.y - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_place_of_a_cloud_is_a_pose_or_a_matrix() {
+        let folder = tempfile::tempdir().unwrap();
+        let read = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            read_world_from_cloud(&path)
+        };
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let pose = format!("461000.5 5428000 3 0 0 {half} {half}");
+        let rows = "0 -1 0 461000.5\n1 0 0 5428000\n0 0 1 3\n";
+        for text in [
+            format!("# x y z qx qy qz qw\n{pose}\n"),
+            format!("1403636579.5 {pose}\n"),
+            rows.to_string(),
+            format!("{rows}0 0 0 1\n"),
+            "world_from_cloud: [0, -1, 0, 461000.5, 1, 0, 0, 5428000, 0, 0, 1, 3, 0, 0, 0, 1]\n".to_string(),
+        ] {
+            let rigid = read("place.txt", &text).unwrap();
+            assert_eq!(rigid.translation(), nalgebra::Vector3::new(461_000.5, 5_428_000.0, 3.0), "{text}");
+            assert!((rigid.rotate(&[1.0, 0.0, 0.0].into()).y - 1.0).abs() < 1e-12, "{text}");
+        }
+        for (text, expected) in [
+            ("1 2 3\n", "3 numbers are neither a pose"),
+            ("1 2 3 0 0 0 0\n", "place.txt: the pose"),
+            ("x: 1\n", "no transform is given"),
+            ("2 0 0 0 0 1 0 0 0 0 1 0\n", "place.txt: the matrix"),
+        ] {
+            let error = read("place.txt", text).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
         }
     }
 

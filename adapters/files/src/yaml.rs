@@ -37,6 +37,23 @@ pub fn parse<T: DeserializeOwned>(text: &str) -> DataResult<T> {
     })
 }
 
+/// The bytes of a small file.
+pub(crate) fn read_bytes(path: &Path) -> DataResult<Vec<u8>> {
+    let failed = |e: std::io::Error| match e.kind() {
+        std::io::ErrorKind::NotFound => DataError::of_kind(ErrorKind::Missing, "no such file").at(path),
+        _ => DataError::new("cannot be read").at(path).because(e),
+    };
+    let mut bytes = Vec::new();
+    File::open(path).map_err(failed)?.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
+    match bytes.len() as u64 {
+        0 => Err(DataError::new("the file is empty").at(path)),
+        n if n > MAX_BYTES => {
+            Err(DataError::new("is larger than 4 MiB, which no description of a sensor is").at(path))
+        }
+        _ => Ok(bytes),
+    }
+}
+
 /// The text of a small file, decoded as UTF-8.
 pub(crate) fn read_text(path: &Path) -> DataResult<String> {
     let failed = |e: std::io::Error| match e.kind() {

@@ -7,12 +7,14 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, UnitQuaternion, Vector3};
 use vice_core::camera::Camera;
-use vice_core::dataset::{Dataset, DepthImage, Fact, Floor, GROUND_TRUTH, Image, Plane, depth_unit_doubt};
+use vice_core::dataset::{
+    CloudRef, CloudSource, Dataset, DepthImage, Fact, Floor, GROUND_TRUTH, Image, Plane, depth_unit_doubt,
+};
 use vice_core::error::{DataError, DataResult, ErrorKind, one_line};
 use vice_core::finding::Finding;
-use vice_core::frames::{BodyFromCamera, Sensor};
+use vice_core::frames::{BodyFromCamera, Rigid, Sensor};
 use vice_core::imu::{ImuSample, InertialState, fit_velocity};
 use vice_core::suspicion::Suspicion;
 use vice_core::time::{Span, Stamp};
@@ -27,6 +29,7 @@ use crate::pixels::{self, DepthUnit, Packing};
 use crate::series::PoseTopic;
 use crate::settings::Settings;
 use crate::streams::{self, GroundTruth, ODOM, SLAM};
+use crate::sweeps::{self, Placed};
 use crate::tf::{TfTree, Transform, list};
 use crate::wire::Reader;
 
@@ -54,6 +57,7 @@ pub(crate) struct RosDataset {
     /// How long after their stamps messages were recorded.
     pub(crate) delays: Vec<Finding>,
     pub(crate) imu: OnceLock<Result<Arc<[ImuSample]>, String>>,
+    pub(crate) cloud: OnceLock<Result<(Vector3<f64>, Arc<[Point3<f32>]>), String>>,
 }
 
 impl RosDataset {
@@ -123,6 +127,33 @@ impl RosDataset {
                 .at(&self.path)
                 .hint(format!("set base_frame; frames of tf: {}", list(&self.tf.frames())))
         })
+    }
+
+    /// The sweeps of a topic in the world.
+    fn sweeps(&self, topic: &Topic) -> DataResult<sweeps::Scan> {
+        let streams = self.streams();
+        let stream = match (self.settings.get("cloud_stream"), streams.first()) {
+            (Some(stream), _) => stream.to_string(),
+            (None, Some(first)) => first.clone(),
+            (None, None) => {
+                return Err(DataError::of_kind(
+                    ErrorKind::Missing,
+                    "no stream places its sweeps in the world",
+                ));
+            }
+        };
+        let trajectory = self.trajectory(&stream)?;
+        let of_topic = |name: &str| self.poses.get(name).map(|topic| topic.parent.as_str());
+        let world = match (stream.as_str(), &self.ground_truth) {
+            (GROUND_TRUTH, Some(GroundTruth::Topic(name))) => of_topic(name),
+            (GROUND_TRUTH, Some(GroundTruth::File(_))) => None,
+            (ODOM, _) => self.frames.odom.as_deref(),
+            (SLAM, _) => self.frames.map.as_deref(),
+            (name, _) => of_topic(name),
+        };
+        let (tf, base, stamps) = (&self.tf, self.base()?, self.settings.stamps()?);
+        let placed = Placed { trajectory: &trajectory, stream: &stream, world, tf, base, stamps };
+        sweeps::read(&self.recording, topic, &placed, &self.doubts)
     }
 
     /// The trajectory to which inertial samples are tied.
@@ -264,6 +295,32 @@ impl Dataset for RosDataset {
 
     fn has_depth(&self, camera: &str) -> bool {
         self.depth.is_some() && self.default_camera().is_some_and(|c| c.is(camera))
+    }
+
+    fn cloud(&self) -> DataResult<Option<CloudRef>> {
+        let Some(name) = self.settings.get("cloud_topic") else { return Ok(None) };
+        let Some(topic) = self.topics.iter().find(|t| t.name == name && t.kind == sweeps::KIND) else {
+            let of_kind = self.topics.iter().filter(|t| t.kind == sweeps::KIND).map(|t| t.name.as_str());
+            let there: Vec<&str> = of_kind.collect();
+            return Err(DataError::of_kind(ErrorKind::Missing, format!("no PointCloud2 topic {name}"))
+                .at(&self.path)
+                .hint(if there.is_empty() {
+                    "there is none".to_string()
+                } else {
+                    format!("there are: {}", list(&there))
+                }));
+        };
+        let scan = self.cloud.get_or_init(|| match self.sweeps(topic) {
+            Ok(scan) => Ok((scan.origin_m, Arc::from(scan.points))),
+            Err(error) => Err(one_line(&error)),
+        });
+        match scan {
+            Ok((origin_m, points)) => Ok(Some(CloudRef {
+                source: CloudSource::Points(Arc::clone(points)),
+                world_from_cloud: Rigid::from_parts(*origin_m, UnitQuaternion::identity()),
+            })),
+            Err(problem) => Err(DataError::new(format!("topic {name}: {problem}")).at(&self.path)),
+        }
     }
 
     fn floor(&self, keyframe: Stamp) -> DataResult<Floor> {

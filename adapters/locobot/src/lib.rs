@@ -43,6 +43,7 @@ mod pixels;
 mod series;
 mod settings;
 mod streams;
+mod sweeps;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]

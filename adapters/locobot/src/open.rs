@@ -152,6 +152,7 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> DataResult<RosDataset>
         delays,
         doubts,
         imu: OnceLock::new(),
+        cloud: OnceLock::new(),
     })
 }
 

@@ -16,7 +16,7 @@ use crate::tf::Transform;
 const TABLE: &str = "locobot";
 
 /// Keys and what they do.
-const KEYS: [(&str, &str); 17] = [
+const KEYS: [(&str, &str); 19] = [
     ("color_topic", "image topic of the camera (default /camera/color/image_raw, else found by type)"),
     ("depth_topic", "depth image registered to it (default /camera/aligned_depth_to_color/image_raw)"),
     ("camera_info_topic", "its calibration (default: camera_info beside the image topic)"),
@@ -42,6 +42,8 @@ const KEYS: [(&str, &str); 17] = [
     ("body_from_camera", "`tx ty tz qx qy qz qw` (m), in place of tf"),
     ("urdf", "URDF with joints that tf lacks (default: the topic robot_description)"),
     ("stamps", "`header` or `record`: which time counts, where headers have none (default header)"),
+    ("cloud_topic", "PointCloud2 topic whose sweeps are put together as the scan for zmap (default: none)"),
+    ("cloud_stream", "stream that places the sweeps in the world (default: ground-truth, else the first)"),
     ("max_depth_offset", "seconds between a frame and its depth image (default: half a frame period)"),
 ];
 

@@ -4,6 +4,7 @@ mod cameras;
 mod crash;
 mod lenient;
 mod robots;
+mod sweeps;
 
 use std::path::PathBuf;
 

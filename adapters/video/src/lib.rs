@@ -16,7 +16,7 @@
 //! name = "camera"                       # optional
 //! size = [1920, 1080]                   # columns, rows of the film as it is shown
 //! intrinsics = [1400.0, 1400.0, 959.5, 539.5]  # fx fy cx cy in pixels; pixel centres are integers
-//! model = "radtan"                      # optional: pinhole (default), radtan, rational, equidistant
+//! model = "radtan"                      # optional: pinhole (default), radtan, rational, equidistant, ds, eucm, omni, fov
 //! distortion = [0.1, -0.2, 0.0, 0.0]    # coefficients of the model
 //! body_from_camera = [                  # optional: row-major 4x4, metres; by default the body is the camera
 //!   1.0, 0.0, 0.0, 0.0,

@@ -14,7 +14,7 @@ use vice_benches::{in_the_room, keyframe, scan_points};
 use vice_core::camera::{Camera, Model, Pixel};
 use vice_core::depth::DepthSource;
 use vice_core::frames::Rigid;
-use vice_depth::{Cloud, CloudOptions, ZMapDepth, ZMapOptions, depth_image, read_ply_points};
+use vice_depth::{Cloud, CloudOptions, ZMapDepth, ZMapOptions, depth_image, read_scan_points};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -43,12 +43,12 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn read(path: &str) -> Result<(), Box<dyn Error>> {
     let options = CloudOptions::default();
     let start = Instant::now();
-    let points = read_ply_points(path, &options)?;
+    let points = read_scan_points(path, &options)?;
     let (n, took) = (points.points.len(), start.elapsed());
     drop(points);
     println!("read {n} points in {took:.2?}: {:.1} million points/s", n as f64 / took.as_secs_f64() / 1e6);
     let start = Instant::now();
-    let cloud = Arc::new(Cloud::read_ply(path, &options)?);
+    let cloud = Arc::new(Cloud::read(path, &options)?);
     let index = start.elapsed().saturating_sub(took);
     println!("indexed in about {index:.2?}: {:.1} million points/s", n as f64 / index.as_secs_f64() / 1e6);
     println!(

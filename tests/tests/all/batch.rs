@@ -38,11 +38,12 @@ fn bench_says_how_fast_and_how_near_the_limit() {
     assert_eq!(run.code, 0, "{}", run.stderr);
     let document: Value = serde_json::from_str(&run.stdout).unwrap();
     let results = document["results"].as_array().unwrap();
-    assert_eq!(results.len(), 8, "two kernels, four models");
+    assert_eq!(results.len(), 16, "two kernels, eight models");
     for result in results {
         assert!(["project", "track"].contains(&result["kernel"].as_str().unwrap()));
         assert!(
-            ["pinhole", "radtan", "rational", "equidistant"].contains(&result["model"].as_str().unwrap())
+            ["pinhole", "radtan", "rational", "equidistant", "ds", "eucm", "omni", "fov"]
+                .contains(&result["model"].as_str().unwrap())
         );
         assert_eq!((result["points"].as_u64(), result["threads"].as_u64()), (Some(2000), Some(2)));
         assert!(result["points_per_second"].as_f64().unwrap() > 1e4);

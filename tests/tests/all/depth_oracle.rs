@@ -84,7 +84,7 @@ fn compare(source: &dyn DepthSource, mav0: &Path, oracle: &serde_json::Value) ->
 fn floor_and_zmap_agree_with_opencv_and_scipy() {
     let Some(oracle) = vice_tests::shared_json("oracle/euroc_v1_01_vice.json") else { return };
     let Some(mav0) = vice_tests::shared("data/euroc_v1_01/mav0") else { return };
-    let cloud = Cloud::read_ply(mav0.join("pointcloud0/data.ply"), &CloudOptions::default()).unwrap();
+    let cloud = Cloud::read(mav0.join("pointcloud0/data.ply"), &CloudOptions::default()).unwrap();
     assert_eq!(cloud.len(), 454_816);
     let options = ZMapOptions { occlusion: false, ..ZMapOptions::default() };
     let zmap = ZMapDepth::new(cloud.into(), Rigid::identity(), options);

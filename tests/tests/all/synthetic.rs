@@ -134,7 +134,7 @@ fn the_written_folder_is_the_flight() {
         assert!((f64::from(*a) - f64::from(*b)).abs() < 0.51 * METRES_PER_COUNT + 1e-6, "{a} {b}");
     }
     let scan = read.cloud().unwrap().unwrap();
-    assert!(matches!(scan.source, CloudSource::Ply(_)));
+    assert!(matches!(scan.source, CloudSource::File(_)));
     let cloud = load_cloud(&scan, &CloudOptions::default()).unwrap();
     assert_eq!(cloud.len(), synthetic.points().len());
 

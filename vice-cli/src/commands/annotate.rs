@@ -35,7 +35,7 @@ pub(crate) struct Args {
     window: WindowArgs,
     #[command(flatten)]
     streams: StreamArgs,
-    /// Depth source of dots and suggestions: floor, zmap, zcam, mesh, tag [default: floor].
+    /// Depth source of dots and suggestions: floor, zmap, zcam, mesh, tag, stereo [default: floor].
     #[arg(long, value_name = "SOURCE", help_heading = "Depth")]
     depth: Option<String>,
     #[command(flatten)]

@@ -10,22 +10,26 @@ use vice_run::info::describe;
 use vice_run::info_document::document;
 use vice_run::place::Place;
 
-use crate::inputs::DatasetArgs;
+use crate::inputs::{CalibrationArgs, DatasetArgs};
 use crate::outputs::JsonArgs;
 use crate::terminal::{self, Outcome, Verbosity, printable};
 
 /// Arguments of `vice info`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example: vice info V1_01_easy")]
+#[command(
+    after_help = "Examples:\n  vice info V1_01_easy\n  vice info V1_01_easy --camera cam1 --calibration camchain.yaml"
+)]
 pub(crate) struct Args {
     #[command(flatten)]
     dataset: DatasetArgs,
     #[command(flatten)]
     json: JsonArgs,
+    #[command(flatten)]
+    calibration: CalibrationArgs,
 }
 
 pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
-    let spec = args.dataset.spec();
+    let spec = args.calibration.dataset(&args.dataset);
     let registry = formats::registry(&spec.plugins)?;
     if spec.format.is_none()
         && let place = Place::of_data_set(&spec.path)?
@@ -33,20 +37,34 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     {
         return list(&factory.info().name, &place, &runs);
     }
-    let dataset = spec.open_raw(&registry)?;
+    let raw = spec.open_raw(&registry)?;
     if spec.camera.is_some() {
-        spec.camera_name(dataset.as_ref())?;
+        spec.camera_name(raw.as_ref())?;
     }
+    let request = CheckRequest { dataset: spec.clone(), ..CheckRequest::default() };
+    // What cannot be checked is said where it is asked for; what the data set holds is shown all the same.
+    let checked = check_open(&request, raw.clone()).ok();
+    let (dataset, said) = match args.calibration.says_something() {
+        true => {
+            let opened = spec.apply_to(raw)?;
+            let said: Vec<String> = opened.suspicions().map(|s| s.line()).collect();
+            (opened.dataset, said)
+        }
+        false => (raw, Vec::new()),
+    };
     let inputs: Vec<PathBuf> = args.dataset.path.iter().cloned().collect();
     if args.json.json.as_deref() == Some(Path::new("-")) {
         let document = document(dataset.as_ref(), spec.camera.as_deref());
         args.json.put(&inputs, &document, verbosity, String::new)?;
         return Ok(Outcome::Done);
     }
-    let request = CheckRequest { dataset: spec.clone(), ..CheckRequest::default() };
-    // What cannot be checked is said where it is asked for; what the data set holds is shown all the same.
-    let checked = check_open(&request, dataset.clone()).ok();
-    let text = describe(dataset.as_ref(), spec.camera.as_deref())?;
+    let mut text = describe(dataset.as_ref(), spec.camera.as_deref())?;
+    if !said.is_empty() {
+        writeln!(text, "calibration")?;
+    }
+    for line in said {
+        writeln!(text, "  {}", printable(&line))?;
+    }
     let head = checked.map_or_else(String::new, |document| head(&document));
     let text = match text.split_once('\n') {
         Some((first, rest)) => format!("{first}\n{head}{rest}"),

@@ -7,8 +7,32 @@ use vice_run::detect::TagFamily;
 use vice_run::request::DepthName;
 use vice_run::request::{DatasetSpec, DepthSpec, ReferenceSpec, ZMapInterpolation};
 
-use super::{DatasetArgs, numbers, positive, span_not_negative, split_list};
+use vice_run::request::{ImageSize, LensSpec};
+
+use super::{DatasetArgs, numbers, numbers_any, positive, span_not_negative, split_list};
 use crate::terminal::usage;
+
+/// A calibration in place of the data set's.
+#[derive(Clone, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Calibration")]
+pub(crate) struct CalibrationArgs {
+    /// Calibration that overrides the data set's: TOML, or that of Kalibr, OpenVINS, ROS, OpenCV, ORB-SLAM, VINS, Basalt, COLMAP.
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+    /// Intrinsics in pixels, in place of the calibration's.
+    #[arg(long, value_name = "FX,FY,CX,CY", allow_hyphen_values = true, value_parser = numbers::<4>)]
+    intrinsics: Option<[f64; 4]>,
+    /// Lens in place of the calibration's: pinhole, or a model with its coefficients: radtan, rational, equidistant, ds, eucm,
+    /// omni, fov.
+    #[arg(long, value_name = "MODEL:K1,...")]
+    distortion: Option<LensSpec>,
+    /// Columns and rows of the images that the calibration is of.
+    #[arg(long, value_name = "WxH")]
+    image_size: Option<ImageSize>,
+    /// The camera's place in the body: x,y,z in metres and the quaternion, or a matrix row by row.
+    #[arg(long, value_name = "X,Y,Z,QX,QY,QZ,QW", allow_hyphen_values = true, value_parser = numbers_any)]
+    body_from_camera: Option<Vec<f64>>,
+}
 
 /// How depth sources work, and the calibration.
 #[derive(Clone, Debug, clap::Args)]
@@ -35,15 +59,27 @@ pub(crate) struct DepthArgs {
     /// Family of the tags for the depth source tag: 36h11, 25h9 or 16h5 [default: 36h11].
     #[arg(long, value_name = "FAMILY")]
     tag_family: Option<TagFamily>,
-    /// Calibration that overrides the data set's: TOML, or a Kalibr camchain.
+    /// Second camera for the depth source stereo [default: the only other one].
+    #[arg(long, value_name = "NAME")]
+    stereo_camera: Option<String>,
+    /// Scan of the scene in place of the data set's: PLY, PCD, LAS or LAZ, metres.
     #[arg(long, value_name = "FILE")]
-    calibration: Option<PathBuf>,
+    cloud: Option<PathBuf>,
+    /// Faces of the scene in place of the data set's: a PLY file, metres.
+    #[arg(long, value_name = "FILE")]
+    mesh: Option<PathBuf>,
+    /// File with the place of cloud and mesh in the world: x y z qx qy qz qw, or a 4x4 matrix [default: they are in the world's
+    /// frame].
+    #[arg(long, value_name = "FILE")]
+    world_from_cloud: Option<PathBuf>,
+    #[command(flatten)]
+    calibration: CalibrationArgs,
 }
 
 /// Depth sources by name.
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct SourceArgs {
-    /// Depth sources: floor, zmap, zcam, mesh, tag.
+    /// Depth sources: floor, zmap, zcam, mesh, tag, stereo.
     #[arg(long, value_name = "SOURCE,...", required = true)]
     source: Vec<String>,
 }
@@ -83,13 +119,43 @@ impl DepthArgs {
             zcam_range_m: self.zcam_range,
             tag_size_m: self.tag_size,
             tag_family: self.tag_family,
+            stereo_camera: self.stereo_camera.clone(),
             compare: None,
         })
     }
 
     /// The data set with what overrides it.
     pub(crate) fn dataset(&self, dataset: &DatasetArgs) -> DatasetSpec {
-        DatasetSpec { calibration: self.calibration.clone(), floor_plane: self.floor_plane, ..dataset.spec() }
+        DatasetSpec {
+            floor_plane: self.floor_plane,
+            cloud: self.cloud.clone(),
+            mesh: self.mesh.clone(),
+            world_from_cloud: self.world_from_cloud.clone(),
+            ..self.calibration.dataset(dataset)
+        }
+    }
+}
+
+impl CalibrationArgs {
+    /// The data set with this calibration in place of its own.
+    pub(crate) fn dataset(&self, dataset: &DatasetArgs) -> DatasetSpec {
+        DatasetSpec {
+            calibration: self.calibration.clone(),
+            intrinsics: self.intrinsics,
+            distortion: self.distortion.clone(),
+            image_size: self.image_size,
+            body_from_camera: self.body_from_camera.clone(),
+            ..dataset.spec()
+        }
+    }
+
+    /// Whether anything is given.
+    pub(crate) const fn says_something(&self) -> bool {
+        self.calibration.is_some()
+            || self.intrinsics.is_some()
+            || self.distortion.is_some()
+            || self.image_size.is_some()
+            || self.body_from_camera.is_some()
     }
 }
 

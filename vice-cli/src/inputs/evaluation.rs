@@ -10,7 +10,7 @@ use vice_run::request::{LabelsSpec, Protocol, Request, Scoring};
 use super::{DatasetArgs, DepthArgs, StreamArgs, positive, span_not_negative, split_list};
 
 /// What a request in a file takes the place of.
-pub(crate) const ASKED: [&str; 31] = [
+pub(crate) const ASKED: [&str; 39] = [
     "path",
     "format",
     "settings",
@@ -41,7 +41,15 @@ pub(crate) const ASKED: [&str; 31] = [
     "zcam_range",
     "tag_size",
     "tag_family",
+    "stereo_camera",
+    "cloud",
+    "mesh",
+    "world_from_cloud",
     "calibration",
+    "intrinsics",
+    "distortion",
+    "image_size",
+    "body_from_camera",
 ];
 
 /// What must be named where no file holds it.
@@ -66,7 +74,7 @@ pub(crate) struct EvaluationArgs {
     window: WindowArgs,
     #[command(flatten)]
     streams: StreamArgs,
-    /// Depth sources: floor, zmap, zcam, mesh, tag [default: floor].
+    /// Depth sources: floor, zmap, zcam, mesh, tag, stereo [default: floor].
     #[arg(long, value_name = "SOURCE,...", help_heading = "Depth")]
     depth: Vec<String>,
     #[command(flatten)]

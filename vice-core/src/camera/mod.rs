@@ -10,14 +10,26 @@
 //! | [`Model::Radtan`] | k1 k2 p1 p2 \[k3\] | Brown-Conrady, EuRoC `radial-tangential`, ROS `plumb_bob` |
 //! | [`Model::Rational`] | k1 k2 p1 p2 k3 k4 k5 k6 | the paper's model, ROS `rational_polynomial` |
 //! | [`Model::Equidistant`] | k1 k2 k3 k4 | Kannala-Brandt, OpenCV `fisheye` |
+//! | [`Model::DoubleSphere`] | xi alpha | Usenko, Kalibr and Basalt `ds` |
+//! | [`Model::ExtendedUnified`] | alpha beta | Khomutenko, Kalibr and Basalt `eucm` |
+//! | [`Model::Omnidirectional`] | xi k1 k2 p1 p2 | Mei, Kalibr `omni`, OpenCV `omnidir` |
+//! | [`Model::FieldOfView`] | w, radians | Devernay, Kalibr and COLMAP `fov`, ATAN |
+//!
+//! Depth here is along the optical axis, so that a camera sees what lies in front of its plane: of a lens that looks
+//! beyond 90 degrees off the axis, pixels out there have no ray.
 //!
 //! A distortion polynomial fitted inside the image may fold back outside it, so that points far to the side land
 //! in the picture again. The radius where it stops growing is found once, when the camera is built, and nothing
-//! beyond it projects. The inverse is Newton's method with the analytic Jacobian: solved to
-//! [`UNPROJECT_TOLERANCE`] or an error.
+//! beyond it projects. The inverse is a closed form where there is one, else Newton's method with the analytic
+//! Jacobian: solved to [`UNPROJECT_TOLERANCE`] or an error.
 
 mod batch;
+mod double_sphere;
 mod equidistant;
+mod extended_unified;
+mod field_of_view;
+mod named;
+mod omnidirectional;
 mod poly;
 mod radtan;
 mod rational;
@@ -32,7 +44,11 @@ use seed::Seed;
 #[cfg(test)]
 pub(crate) use batch::tests::lenses;
 pub(crate) use batch::{Bound, Pinhole, Track, TrackAlong, with_lens};
+pub use double_sphere::DoubleSphere;
 pub use equidistant::Equidistant;
+pub use extended_unified::ExtendedUnified;
+pub use field_of_view::FieldOfView;
+pub use omnidirectional::Omnidirectional;
 pub use radtan::Radtan;
 pub use rational::Rational;
 
@@ -97,6 +113,14 @@ pub enum Model {
     Rational(Rational),
     /// Polynomial in the angle off the axis.
     Equidistant(Equidistant),
+    /// Two unit spheres and a pinhole.
+    DoubleSphere(DoubleSphere),
+    /// An ellipsoid and a pinhole.
+    ExtendedUnified(ExtendedUnified),
+    /// A unit sphere and a pinhole, then radial and tangential polynomial.
+    Omnidirectional(Omnidirectional),
+    /// Arc tangent of the radius.
+    FieldOfView(FieldOfView),
 }
 
 /// A lens as seen by the solvers: where a normalised point goes, and how that changes.
@@ -124,6 +148,13 @@ pub(crate) trait Distortion: Copy + Send + Sync {
         distorted: (N, N),
     ) -> (N, N, N::Mask) {
         solve::in_the_plane(self, seed, quick_radius, distorted)
+    }
+    /// Where those steps do not decide: a search, or no ray.
+    ///
+    /// # Errors
+    /// [`UnprojectError`] where there is no ray up to `max_radius`.
+    fn undistort_slow(&self, max_radius: f64, distorted: (f64, f64)) -> Result<(f64, f64), UnprojectError> {
+        solve::search(self, max_radius, distorted)
     }
     /// What makes a good start for distorted radii up to `reach`.
     fn seed(&self, reach: f64) -> Seed {
@@ -160,9 +191,21 @@ pub enum CameraError {
     },
     /// The model's name is not known.
     #[error(
-        "unknown camera model `{0}`; known: pinhole, radtan (radial-tangential, plumb_bob), rational (rational_polynomial), equidistant (fisheye, kannala_brandt)"
+        "unknown camera model `{0}`; known: pinhole, radtan (radial-tangential, plumb_bob), rational (rational_polynomial), equidistant (fisheye, kannala_brandt), ds (double_sphere), eucm, omni (mei), fov (atan)"
     )]
     UnknownModel(String),
+    /// A parameter of the lens is outside what its formulas are made for.
+    #[error("{parameter} = {value} of model {model} is not {expected}")]
+    Parameter {
+        /// Name of the model.
+        model: &'static str,
+        /// The model's own name of the parameter.
+        parameter: &'static str,
+        /// The value given.
+        value: f64,
+        /// What it should be, in words.
+        expected: &'static str,
+    },
     /// The model has another number of coefficients.
     #[error("model {model} takes {expected} distortion coefficients, got {got}{}", if *beyond { ", of which those beyond are not zero" } else { "" })]
     CoefficientCount {
@@ -230,79 +273,6 @@ pub struct Camera {
     seed: Seed,
 }
 
-impl Model {
-    /// A model by the names that calibrations use, with its coefficients.
-    ///
-    /// Drivers fill vectors of a fixed length with zeros: those beyond the model's own count are passed over.
-    ///
-    /// # Errors
-    /// [`CameraError`] for an unknown name, a wrong number of coefficients or one that is not finite.
-    pub fn from_name(name: &str, coefficients: &[f64]) -> Result<Self, CameraError> {
-        if !coefficients.iter().all(|c| c.is_finite()) {
-            return Err(CameraError::NotFinite("distortion coefficient"));
-        }
-        let got = coefficients.len();
-        let count = |expected, most: usize| {
-            let model = if name.trim().is_empty() { "none" } else { name.trim() }.to_string();
-            CameraError::CoefficientCount { model, expected, got, beyond: got > most && most > 0 }
-        };
-        match name.trim().to_ascii_lowercase().as_str() {
-            "pinhole" | "none" | "" => match coefficients.iter().all(|c| *c == 0.0) {
-                true => Ok(Self::Pinhole),
-                false => Err(count("no", 0)),
-            },
-            "radtan" | "radial-tangential" | "plumb_bob" | "brown_conrady" => {
-                match *without_padding(coefficients, 5) {
-                    [k1, k2, p1, p2] => Ok(Self::Radtan(Radtan { k1, k2, p1, p2, k3: 0.0 })),
-                    [k1, k2, p1, p2, k3] => Ok(Self::Radtan(Radtan { k1, k2, p1, p2, k3 })),
-                    _ => Err(count("4 or 5", 5)),
-                }
-            }
-            "rational" | "rational_polynomial" => match *without_padding(coefficients, 8) {
-                [k1, k2, p1, p2, k3, k4, k5, k6] => {
-                    Ok(Self::Rational(Rational { k1, k2, p1, p2, k3, k4, k5, k6 }))
-                }
-                _ => Err(count("8", 8)),
-            },
-            "equidistant" | "fisheye" | "kannala_brandt" => match *without_padding(coefficients, 4) {
-                [k1, k2, k3, k4] => Ok(Self::Equidistant(Equidistant { k1, k2, k3, k4 })),
-                _ => Err(count("4", 4)),
-            },
-            _ => Err(CameraError::UnknownModel(name.to_string())),
-        }
-    }
-
-    /// The name VICE writes.
-    pub const fn name(&self) -> &'static str {
-        match self {
-            Self::Pinhole => "pinhole",
-            Self::Radtan(_) => "radtan",
-            Self::Rational(_) => "rational",
-            Self::Equidistant(_) => "equidistant",
-        }
-    }
-
-    /// The coefficients in the order of [`Model::from_name`].
-    pub fn coefficients(&self) -> Vec<f64> {
-        match *self {
-            Self::Pinhole => vec![],
-            Self::Radtan(Radtan { k1, k2, p1, p2, k3 }) => vec![k1, k2, p1, p2, k3],
-            Self::Rational(Rational { k1, k2, p1, p2, k3, k4, k5, k6 }) => {
-                vec![k1, k2, p1, p2, k3, k4, k5, k6]
-            }
-            Self::Equidistant(Equidistant { k1, k2, k3, k4 }) => vec![k1, k2, k3, k4],
-        }
-    }
-}
-
-/// The coefficients without zeros beyond the `most` that a model takes.
-fn without_padding(coefficients: &[f64], most: usize) -> &[f64] {
-    match coefficients.split_at_checked(most) {
-        Some((own, padding)) if padding.iter().all(|c| *c == 0.0) => own,
-        _ => coefficients,
-    }
-}
-
 impl Camera {
     /// A camera from its image size, `[fx, fy, cx, cy]` in pixels, and its lens.
     ///
@@ -326,6 +296,7 @@ impl Camera {
         if !model.coefficients().iter().all(|c| c.is_finite()) {
             return Err(CameraError::NotFinite("distortion coefficient"));
         }
+        model.check()?;
         // The farthest corner of the image, and a little beyond.
         let side = |n: u32, f: f64, c: f64| REACH * (c.abs() + 1.0).max((f64::from(n) - c).abs()) / f;
         let reach = [side(width, fx, cx), side(height, fy, cy)];
@@ -334,6 +305,10 @@ impl Camera {
             Model::Radtan(m) => (m.max_radius(), solve::seed_of(m, reach)),
             Model::Rational(m) => (m.max_radius(), solve::seed_of(m, reach)),
             Model::Equidistant(m) => (m.max_radius(), solve::seed_of(m, reach)),
+            Model::DoubleSphere(m) => (m.max_radius(), solve::seed_of(m, reach)),
+            Model::ExtendedUnified(m) => (m.max_radius(), solve::seed_of(m, reach)),
+            Model::Omnidirectional(m) => (m.max_radius(), solve::seed_of(m, reach)),
+            Model::FieldOfView(m) => (m.max_radius(), solve::seed_of(m, reach)),
         };
         Ok(Self { width, height, fx, fy, cx, cy, model, max_radius, seed })
     }
@@ -392,6 +367,10 @@ impl Camera {
             Model::Radtan(m) => m.distort(x, y),
             Model::Rational(m) => m.distort(x, y),
             Model::Equidistant(m) => m.distort(x, y),
+            Model::DoubleSphere(m) => m.distort(x, y),
+            Model::ExtendedUnified(m) => m.distort(x, y),
+            Model::Omnidirectional(m) => m.distort(x, y),
+            Model::FieldOfView(m) => m.distort(x, y),
         };
         Ok(Pixel::new(self.fx * xd + self.cx, self.fy * yd + self.cy))
     }
@@ -410,6 +389,10 @@ impl Camera {
             Model::Radtan(m) => solve::undistort(m, &self.seed, self.max_radius, (xd, yd))?,
             Model::Rational(m) => solve::undistort(m, &self.seed, self.max_radius, (xd, yd))?,
             Model::Equidistant(m) => solve::undistort(m, &self.seed, self.max_radius, (xd, yd))?,
+            Model::DoubleSphere(m) => solve::undistort(m, &self.seed, self.max_radius, (xd, yd))?,
+            Model::ExtendedUnified(m) => solve::undistort(m, &self.seed, self.max_radius, (xd, yd))?,
+            Model::Omnidirectional(m) => solve::undistort(m, &self.seed, self.max_radius, (xd, yd))?,
+            Model::FieldOfView(m) => solve::undistort(m, &self.seed, self.max_radius, (xd, yd))?,
         };
         Ok(Vector3::new(x, y, 1.0))
     }

@@ -30,7 +30,7 @@ pub(super) fn undistort<D: Distortion>(
 ) -> Result<(f64, f64), UnprojectError> {
     match lens.undistort_fast(seed, quick_radius(max_radius), (xd, yd)) {
         (x, y, true) => Ok((x, y)),
-        _ => search(lens, max_radius, (xd, yd)),
+        _ => lens.undistort_slow(max_radius, (xd, yd)),
     }
 }
 
@@ -89,9 +89,40 @@ pub(super) fn in_the_plane<D: Distortion, N: Number>(
     (x, y, rd2.both(settled, inside))
 }
 
+/// A ray that a closed form gives, where it is not too near the rim.
+#[inline(always)]
+pub(super) fn closed<N: Number>((x, y, reached): (N, N, N::Mask), quick_radius: f64) -> (N, N, N::Mask) {
+    let inside = (x * x + y * y).at_most(x.of(quick_radius * quick_radius));
+    (x, y, x.both(reached, inside))
+}
+
+/// A ray that a closed form gives, up to the rim.
+pub(super) fn closed_to_the_rim(
+    (x, y, reached): (f64, f64, bool),
+    max_radius: f64,
+) -> Result<(f64, f64), UnprojectError> {
+    let r2 = x * x + y * y;
+    match reached && r2.is_finite() && r2.sqrt() <= max_radius * RIM {
+        true => Ok((x, y)),
+        false => Err(UnprojectError::OutsideModel),
+    }
+}
+
+/// `(x, y)` times a scale that depends on the radius alone, and the Jacobian; of the scale twice the derivative by `r²`.
+#[inline(always)]
+pub(super) fn radial_with_jacobian<N: Number>(x: N, y: N, scale: N, twice_slope: N) -> ((N, N), [N; 4]) {
+    let cross = x * y * twice_slope;
+    ((x * scale, y * scale), [scale + x * x * twice_slope, cross, cross, scale + y * y * twice_slope])
+}
+
+/// The normalised radius of an angle off the axis by its cosine.
+pub(super) fn radius_of_cosine(cosine: f64) -> f64 {
+    ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt() / cosine
+}
+
 /// Newton from the distorted point converges in four or five steps for nearly every lens; where it leaves the valid
 /// radius, a second start comes from the radial part alone, which is monotonic there and so can be bracketed.
-fn search<D: Distortion>(
+pub(super) fn search<D: Distortion>(
     lens: &D,
     max_radius: f64,
     (xd, yd): (f64, f64),

@@ -15,6 +15,12 @@ fn lenses() -> Vec<(&'static str, Camera)> {
         camera("plumb_bob", [619.9, 620.11, 320.65, 241.11], &plumb),
         camera("rational", [610.0, 611.5, 322.0, 243.0], &rational),
         camera("equidistant", [190.98, 190.97, 254.93, 256.9], &fisheye),
+        camera("ds", [313.21, 313.21, 376.0, 240.0], &[-0.18, 0.59]),
+        camera("ds", [150.0, 150.0, 376.0, 240.0], &[-0.6, 0.7]),
+        camera("ds", [250.0, 250.0, 376.0, 240.0], &[0.3, 0.4]),
+        camera("eucm", [460.0, 460.1, 366.0, 248.0], &[0.63, 1.04]),
+        camera("omni", [870.0, 871.0, 370.0, 243.0], &[1.6, -0.2, 0.05, 0.0005, -0.0003]),
+        camera("fov", [380.0, 381.0, 370.0, 243.0], &[0.93]),
     ]
 }
 
@@ -63,6 +69,10 @@ proptest! {
                 Model::Radtan(m) => jacobian_is_slope(&m, x, y)?,
                 Model::Rational(m) => jacobian_is_slope(&m, x, y)?,
                 Model::Equidistant(m) => jacobian_is_slope(&m, x, y)?,
+                Model::DoubleSphere(m) => jacobian_is_slope(&m, x, y)?,
+                Model::ExtendedUnified(m) => jacobian_is_slope(&m, x, y)?,
+                Model::Omnidirectional(m) => jacobian_is_slope(&m, x, y)?,
+                Model::FieldOfView(m) => jacobian_is_slope(&m, x, y)?,
             }
         }
     }
@@ -102,7 +112,7 @@ fn bad_calibrations_are_named() {
     assert!(matches!(Camera::new(0, 480, k, Model::Pinhole), Err(CameraError::EmptyImage { .. })));
     let negative = Camera::new(640, 480, [400.0, -1.0, 0.0, 0.0], Model::Pinhole);
     assert_eq!(negative.unwrap_err().to_string(), "focal length fy = -1 is not positive");
-    assert!(matches!(Model::from_name("omni", &[]), Err(CameraError::UnknownModel(_))));
+    assert!(matches!(Model::from_name("fishbowl", &[]), Err(CameraError::UnknownModel(_))));
     assert!(matches!(Model::from_name("radtan", &[1.0]), Err(CameraError::CoefficientCount { .. })));
     assert!(matches!(Model::from_name("radtan", &[f64::NAN; 4]), Err(CameraError::NotFinite(_))));
 }
@@ -134,4 +144,58 @@ fn vectors_that_drivers_fill_with_zeros_are_those_of_the_model() {
         error.to_string(),
         "model plumb_bob takes 4 or 5 distortion coefficients, got 8, of which those beyond are not zero"
     );
+}
+
+#[test]
+fn parameters_outside_their_range_are_named() {
+    for (name, coefficients, expected) in [
+        ("ds", &[-1.0, 0.5] as &[f64], "xi = -1 of model ds is not above -1"),
+        ("ds", &[0.1, 1.2], "alpha = 1.2 of model ds is not from 0 to 1"),
+        ("eucm", &[0.5, 0.0], "beta = 0 of model eucm is not above 0"),
+        ("eucm", &[-0.1, 1.0], "alpha = -0.1 of model eucm is not from 0 to 1"),
+        ("omni", &[-2.0, 0.0, 0.0, 0.0, 0.0], "xi = -2 of model omni is not above -1"),
+        ("fov", &[0.0], "w = 0 of model fov is not an angle above 0 and below pi radians"),
+        ("fov", &[3.2], "w = 3.2 of model fov"),
+        (
+            "omni",
+            &[1.0, 0.1],
+            "model omni takes 1 or 5 (xi, then k1, k2, p1, p2) distortion coefficients, got 2",
+        ),
+        ("ds", &[0.1], "model ds takes 2 (xi, alpha) distortion coefficients, got 1"),
+    ] {
+        let error = Model::from_name(name, coefficients).unwrap_err().to_string();
+        assert!(error.starts_with(expected), "{error}");
+    }
+    let lens = Model::ExtendedUnified(ExtendedUnified { alpha: 2.0, beta: 1.0 });
+    assert!(Camera::new(640, 480, [400.0, 400.0, 320.0, 240.0], lens).is_err());
+}
+
+#[test]
+fn what_a_wide_lens_sees_behind_its_plane_has_no_ray() {
+    // 110 degrees off the axis are inside the image of each of these lenses.
+    for (name, coefficients, radius_at_90) in [
+        ("ds", &[-0.2, 0.6] as &[f64], 1.0 / (0.6 * (1.0_f64 + 0.04).sqrt() - 0.4 * 0.2)),
+        ("eucm", &[0.6, 1.1], 1.0 / (0.6 * 1.1_f64.sqrt())),
+        ("omni", &[1.2, 0.0, 0.0, 0.0, 0.0], 1.0 / 1.2),
+        ("fov", &[1.0], std::f64::consts::FRAC_PI_2),
+    ] {
+        let lens = Model::from_name(name, coefficients).unwrap();
+        let camera = Camera::new(1000, 1000, [200.0, 200.0, 500.0, 500.0], lens).unwrap();
+        assert_eq!(camera.project(&Point3::new(1.0, 0.0, -0.1)), Err(ProjectError::BehindCamera));
+        let at = |radius: f64| camera.unproject(Pixel::new(500.0 + 200.0 * radius, 500.0));
+        assert!(at(radius_at_90 * 0.999).unwrap().x > 100.0, "{name}");
+        assert_eq!(at(radius_at_90 * 1.001), Err(UnprojectError::OutsideModel), "{name}");
+    }
+}
+
+#[test]
+fn a_double_sphere_ends_where_its_image_no_longer_grows() {
+    for (xi, alpha) in [(-0.6, 0.7), (-0.5, 0.2), (-0.3, 0.9), (-0.9, 0.0)] {
+        let lens = DoubleSphere { xi, alpha };
+        let rim = lens.max_radius();
+        assert!(rim.is_finite(), "{xi} {alpha}");
+        let grows = |r: f64| lens.radial(r * (1.0 + 1e-6)) > lens.radial(r) && lens.radial(r) > 0.0;
+        assert!((1..1000).all(|i| grows(rim * f64::from(i) * 0.999e-3)), "{xi} {alpha}");
+        assert!(!grows(rim * 1.01), "{xi} {alpha}: {rim}");
+    }
 }

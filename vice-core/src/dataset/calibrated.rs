@@ -13,7 +13,7 @@ use crate::suspicion::Suspicion;
 use crate::time::Stamp;
 use crate::trajectory::Trajectory;
 
-/// A data set whose calibration, floor or cloud were given by the user. Everything else is as it was, so that nobody
+/// A data set whose calibration, floor, cloud or mesh were given by the user. Everything else is as it was, so that nobody
 /// behind it has to ask whether anything was overridden.
 #[derive(Clone)]
 pub struct Calibrated {
@@ -22,12 +22,20 @@ pub struct Calibrated {
     extrinsics: BTreeMap<String, BodyFromCamera>,
     floor: Option<Floor>,
     cloud: Option<CloudRef>,
+    mesh: Option<CloudRef>,
 }
 
 impl Calibrated {
     /// A data set in which nothing is overridden yet.
     pub const fn new(inner: Arc<dyn Dataset>) -> Self {
-        Self { inner, cameras: BTreeMap::new(), extrinsics: BTreeMap::new(), floor: None, cloud: None }
+        Self {
+            inner,
+            cameras: BTreeMap::new(),
+            extrinsics: BTreeMap::new(),
+            floor: None,
+            cloud: None,
+            mesh: None,
+        }
     }
 
     /// Replaces the intrinsics of a camera.
@@ -55,6 +63,13 @@ impl Calibrated {
     #[must_use]
     pub fn with_cloud(mut self, cloud: CloudRef) -> Self {
         self.cloud = Some(cloud);
+        self
+    }
+
+    /// Replaces the faces of the scene.
+    #[must_use]
+    pub fn with_mesh(mut self, mesh: CloudRef) -> Self {
+        self.mesh = Some(mesh);
         self
     }
 }
@@ -122,6 +137,15 @@ impl Dataset for Calibrated {
 
     fn cloud(&self) -> DataResult<Option<CloudRef>> {
         self.cloud.as_ref().map_or_else(|| self.inner.cloud(), |own| Ok(Some(own.clone())))
+    }
+
+    fn mesh(&self) -> DataResult<Option<CloudRef>> {
+        match (&self.mesh, &self.cloud) {
+            (Some(own), _) => Ok(Some(own.clone())),
+            // A scan in place of the data set's is in place of its faces too.
+            (None, Some(cloud)) => Ok(Some(cloud.clone())),
+            (None, None) => self.inner.mesh(),
+        }
     }
 
     fn floor(&self, keyframe: Stamp) -> DataResult<Floor> {

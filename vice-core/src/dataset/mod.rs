@@ -129,6 +129,14 @@ pub trait Dataset: Send + Sync {
         Ok(None)
     }
 
+    /// The faces of the scene, where there are any; by default those of the scan's file.
+    ///
+    /// # Errors
+    /// [`DataError`](crate::error::DataError) if their description cannot be used.
+    fn mesh(&self) -> DataResult<Option<CloudRef>> {
+        self.cloud()
+    }
+
     /// The floor as it is known at a key frame. By default z = 0 of the world; [`Floor::Unknown`] where nothing tells.
     ///
     /// # Errors
@@ -225,8 +233,8 @@ pub struct Fact {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum CloudSource {
-    /// A PLY file.
-    Ply(PathBuf),
+    /// A file of points: PLY, or what else the depth sources read.
+    File(PathBuf),
     /// Points in memory, metres.
     Points(Arc<[Point3<f32>]>),
 }

@@ -33,7 +33,8 @@ pub enum Flaw {
     /// The estimate drifts at a constant rate: velocity in its world, and yaw rate about its z axis.
     Drift,
     /// Coefficients of the lens are off or were left out: used = true + error. Of an equidistant lens `k1` and `k2` are
-    /// those of the angle, and there is no tangential part.
+    /// those of the angle, and there is no tangential part. Of a double sphere, an extended unified or a field-of-view
+    /// lens it is not looked for.
     Distortion,
     /// fx alone is too long by a share, against fy.
     Aspect,

@@ -5,7 +5,7 @@ use std::ops::{Index, IndexMut};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::flaw::{Flaw, PARAMETER_COUNT};
-use crate::camera::{Camera, CameraError, Equidistant, Model, Radtan, Rational};
+use crate::camera::{Camera, CameraError, Equidistant, Model, Omnidirectional, Radtan, Rational};
 use crate::frames::{BodyFromCamera, Rigid};
 
 /// The errors of what is in use, in the order and units of [`super::PARAMETERS`]. Zero where nothing is wrong.
@@ -72,6 +72,15 @@ impl Theta {
                 Model::Rational(Rational { k1: m.k1 - k1, k2: m.k2 - k2, p1: m.p1 - p1, p2: m.p2 - p2, ..m })
             }
             Model::Equidistant(m) => Model::Equidistant(Equidistant { k1: m.k1 - k1, k2: m.k2 - k2, ..m }),
+            Model::Omnidirectional(m) => Model::Omnidirectional(Omnidirectional {
+                k1: m.k1 - k1,
+                k2: m.k2 - k2,
+                p1: m.p1 - p1,
+                p2: m.p2 - p2,
+                ..m
+            }),
+            // Nothing of theirs is like these coefficients: such a flaw has no effect, and so is not found.
+            Model::DoubleSphere(_) | Model::ExtendedUnified(_) | Model::FieldOfView(_) => *used,
         }
     }
 

@@ -188,7 +188,7 @@ pub(super) fn suspicions(
         list.push(
             Suspicion::new(reason.name(), &about, message)
                 .evidence(format!("{} of {keyframes}: {}{more}", of_reason.len(), named.join(", ")))
-                .advice("points off the floor need `depth` zmap, zcam, mesh or tag, or must not be labelled"),
+                .advice("points off the floor need `depth` zmap, zcam, mesh, tag or stereo, or must not be labelled"),
         );
     }
     if let Some((factor, n, of)) = common {

@@ -19,7 +19,8 @@ use vice_core::dataset::{CloudRef, CloudSource};
 use vice_core::error::{DataError, DataResult};
 use vice_core::suspicion::{Suspicion, Suspicions};
 
-use crate::ply::{self, PointSink};
+use crate::ply::PointSink;
+use crate::scan_file;
 use collect::Collector;
 use tree::Tree;
 pub(crate) use tree::{Bounds, Leaf, Overlap, Patch};
@@ -50,17 +51,18 @@ pub struct ScanPoints {
     pub suspicions: Suspicions,
 }
 
-/// Reads the points of a PLY file: text or binary, any order and type of properties. Faces are not looked at.
+/// Reads the points of a PLY, PCD, LAS or LAZ file: text, binary or compressed, any order and type of properties. Faces are
+/// not looked at. LAS and LAZ take the feature `las`.
 ///
 /// Points that are not finite are left out, which a suspicion says.
 ///
 /// # Errors
 /// [`DataError`] with the byte or line if the file cannot be used, ends too early, has no finite point, or does not
 /// fit in memory.
-pub fn read_ply_points(path: impl AsRef<Path>, options: &CloudOptions) -> DataResult<ScanPoints> {
+pub fn read_scan_points(path: impl AsRef<Path>, options: &CloudOptions) -> DataResult<ScanPoints> {
     let path = path.as_ref();
     let mut collector = Collector::new(options)?;
-    ply::read_points(path, &mut collector)?;
+    scan_file::read_points(path, &mut collector)?;
     collector.finish(&path.display().to_string()).map_err(|e| e.at(path))
 }
 
@@ -77,13 +79,13 @@ pub struct Cloud {
 }
 
 impl Cloud {
-    /// Reads a PLY file, as [`read_ply_points`] does, and indexes it.
+    /// Reads a file, as [`read_scan_points`] does, and indexes it.
     ///
     /// # Errors
-    /// As [`read_ply_points`].
-    pub fn read_ply(path: impl AsRef<Path>, options: &CloudOptions) -> DataResult<Self> {
+    /// As [`read_scan_points`].
+    pub fn read(path: impl AsRef<Path>, options: &CloudOptions) -> DataResult<Self> {
         let path = path.as_ref();
-        Ok(Self::indexed(read_ply_points(path, options)?, &path.display().to_string()))
+        Ok(Self::indexed(read_scan_points(path, options)?, &path.display().to_string()))
     }
 
     /// A scan from points in memory, metres.
@@ -177,10 +179,10 @@ impl Cloud {
 /// Reads or copies the points that a data set refers to.
 ///
 /// # Errors
-/// As [`Cloud::read_ply`] and [`Cloud::from_points`].
+/// As [`Cloud::read`] and [`Cloud::from_points`].
 pub fn load_cloud(cloud: &CloudRef, options: &CloudOptions) -> DataResult<Arc<Cloud>> {
     let cloud = match &cloud.source {
-        CloudSource::Ply(path) => Cloud::read_ply(path, options)?,
+        CloudSource::File(path) => Cloud::read(path, options)?,
         CloudSource::Points(points) => Cloud::from_points(points.iter().copied(), options)?,
         _ => return Err(DataError::new("a cloud of this kind cannot be read")),
     };

@@ -19,7 +19,7 @@ use vice_core::error::{DataError, DataResult};
 use header::{Element, Header, Kind};
 pub(crate) use rows::PointSink;
 use rows::Rows;
-use source::Source;
+pub(crate) use source::Source;
 
 /// Reads the points of a PLY file, metres.
 pub(crate) fn read_points(path: &Path, sink: &mut impl PointSink) -> DataResult<()> {
@@ -68,12 +68,12 @@ fn mesh_from(
 }
 
 /// Opens a file; its length is known where it is a regular one.
-fn open(path: &Path) -> DataResult<(File, Option<u64>)> {
+pub(crate) fn open(path: &Path) -> DataResult<(File, Option<u64>)> {
     let failed = |e: std::io::Error| DataError::new("cannot be opened").because(e).at(path);
     let file = File::open(path).map_err(failed)?;
     let metadata = file.metadata().map_err(failed)?;
     if metadata.is_dir() {
-        return Err(DataError::new("is a folder, not a PLY file").at(path));
+        return Err(DataError::new("is a folder, not a file of points").at(path));
     }
     Ok((file, metadata.is_file().then_some(metadata.len())))
 }

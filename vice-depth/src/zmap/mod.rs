@@ -6,6 +6,7 @@
 //! image, are answered by triangulating the whole image once.
 
 mod buffer;
+mod elsewhere;
 mod interpolate;
 mod natural;
 mod occlude;
@@ -27,6 +28,7 @@ use vice_core::frames::{self, Rigid, World};
 use vice_core::suspicion::Suspicion;
 
 use crate::cloud::Cloud;
+use elsewhere::Nearest;
 use interpolate::{Local, Surface};
 use occlude::Occlusion;
 use queries::Queries;
@@ -86,16 +88,17 @@ pub struct ZMapDepth {
     cloud: Arc<Cloud>,
     world_from_cloud: Rigid<World, frames::Cloud>,
     options: ZMapOptions,
+    nearest: Nearest,
 }
 
 impl ZMapDepth {
     /// A Z-map of a cloud that lies in the world.
-    pub const fn new(
+    pub fn new(
         cloud: Arc<Cloud>,
         world_from_cloud: Rigid<World, frames::Cloud>,
         options: ZMapOptions,
     ) -> Self {
-        Self { cloud, world_from_cloud, options }
+        Self { cloud, world_from_cloud, options, nearest: Nearest::default() }
     }
 
     /// The points of a key frame between which depth is interpolated, in no order that matters: their pixels
@@ -165,7 +168,7 @@ impl DepthSource for ZMapDepth {
     }
 
     fn suspicions(&self) -> Vec<Suspicion> {
-        self.cloud.suspicions().iter().cloned().collect()
+        self.cloud.suspicions().iter().cloned().chain(self.nearest.doubt(&self.cloud)).collect()
     }
 
     fn roughness(&self) -> f64 {
@@ -180,6 +183,7 @@ impl DepthSource for ZMapDepth {
         let Some(camera_from_cloud) = self.camera_from_cloud(keyframe) else {
             return Ok(vec![Err(DepthMiss::NoAnchor); pixels.len()]);
         };
+        self.nearest.add(&self.cloud, &camera_from_cloud.inverse().translation());
         let camera = keyframe.camera;
         let view = View::new(&self.cloud, camera, &camera_from_cloud);
         let region = self.region(camera);

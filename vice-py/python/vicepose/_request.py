@@ -57,7 +57,21 @@ OPTIONS = """
     camera : str, optional
         Camera; the first where it is left out.
     calibration : path, optional
-        Calibration that overrides the recording's: TOML, or a Kalibr camchain.
+        Calibration that overrides the recording's: TOML, or what another tool wrote.
+    intrinsics : (fx, fy, cx, cy), optional
+        Intrinsics in pixels, in place of the calibration's.
+    distortion : str, optional
+        Lens in place of the calibration's, such as ``"radtan:k1,k2,p1,p2"``.
+    image_size : (int, int), optional
+        Columns and rows of the images that the calibration is of.
+    body_from_camera : sequence of float, optional
+        The camera's place in the body: x, y, z, qx, qy, qz, qw, or a 4x4 matrix row by row, metres.
+    cloud : path, optional
+        Scan of the scene in place of the recording's: PLY, PCD, LAS or LAZ, metres.
+    mesh : path, optional
+        Faces of the scene in place of the recording's: a PLY file, metres.
+    world_from_cloud : path, optional
+        File with the place of cloud and mesh in the world: x y z qx qy qz qw, or a 4x4 matrix.
     floor_plane : (nx, ny, nz, d), optional
         Floor plane n·p + d = 0 in the world, metres, in place of the recording's.
     points : sequence of str, optional
@@ -84,7 +98,7 @@ OPTIONS = """
         What places the camera in the world for depth: ``reference``, ``estimate``, or the name of a stream.
     initial_pose : (x, y, z, qx, qy, qz, qw), optional
         Pose ``world_from_body`` of the anchoring estimate at the first key frame, metres.
-    zmap_occlusion, zmap_interpolation, cloud_voxel, zcam_range, tag_size, tag_family, depth_check, subsets, align
+    zmap_occlusion, zmap_interpolation, cloud_voxel, zcam_range, tag_size, tag_family, stereo_camera, depth_check, subsets, align
         As the options of ``vice evaluate`` of these names.
 """
 
@@ -94,6 +108,13 @@ def request_text(
     depth: str | Sequence[str] | None,
     camera: str | None = None,
     calibration: PathLike | None = None,
+    intrinsics: Sequence[float] | None = None,
+    distortion: str | None = None,
+    image_size: Sequence[int] | None = None,
+    body_from_camera: Sequence[float] | None = None,
+    cloud: PathLike | None = None,
+    mesh: PathLike | None = None,
+    world_from_cloud: PathLike | None = None,
     floor_plane: Sequence[float] | None = None,
     points: Sequence[str] | None = None,
     observations: str | None = None,
@@ -113,6 +134,7 @@ def request_text(
     zcam_range: Sequence[float] | None = None,
     tag_size: float | None = None,
     tag_family: str | None = None,
+    stereo_camera: str | None = None,
     depth_check: bool | None = None,
     subsets: int | Sequence[int] | None = None,
     align: str | None = None,
@@ -120,7 +142,18 @@ def request_text(
     """The request without the run, the labels and the streams: plain data, as a file of ``vice evaluate --request``."""
     request = {
         "dataset": without_none(
-            {"camera": camera, "calibration": _text(calibration), "floor_plane": _numbers(floor_plane)}
+            {
+                "camera": camera,
+                "calibration": _text(calibration),
+                "intrinsics": _numbers(intrinsics),
+                "distortion": distortion,
+                "image_size": None if image_size is None else "x".join(str(int(side)) for side in image_size),
+                "body_from_camera": _numbers(body_from_camera),
+                "cloud": _text(cloud),
+                "mesh": _text(mesh),
+                "world_from_cloud": _text(world_from_cloud),
+                "floor_plane": _numbers(floor_plane),
+            }
         ),
         "labels": {"file": "", **without_none({"points": as_list(points), "observations": observations})},
         "protocol": without_none({"fps": _number(fps), "start_s": _number(start), "duration_s": _number(duration)}),
@@ -144,6 +177,7 @@ def request_text(
                 "zcam_range_m": _numbers(zcam_range),
                 "tag_size_m": _number(tag_size),
                 "tag_family": tag_family,
+                "stereo_camera": stereo_camera,
                 "compare": depth_check,
             }
         ),

@@ -159,7 +159,7 @@ fn name(spec: &TrackingSpec, scene: &Scene) -> Option<String> {
 fn scan(cloud: &vice_core::dataset::CloudRef) -> String {
     use vice_core::dataset::CloudSource;
     match &cloud.source {
-        CloudSource::Ply(path) => {
+        CloudSource::File(path) => {
             let meta = std::fs::metadata(path).ok();
             let time = meta.as_ref().and_then(|m| m.modified().ok());
             format!("{} {:?} {:?}", path.display(), meta.as_ref().map(std::fs::Metadata::len), time)

@@ -53,12 +53,19 @@ enum Kind {
 }
 
 /// Options, where they stand in a request, and what they hold.
-const FIELDS: [(&str, &str, Kind); 32] = [
+const FIELDS: [(&str, &str, Kind); 40] = [
     ("dataset", "dataset.path", Kind::Text),
     ("format", "dataset.format", Kind::Text),
     ("set", "dataset.set", Kind::Settings),
     ("camera", "dataset.camera", Kind::Text),
     ("calibration", "dataset.calibration", Kind::Text),
+    ("intrinsics", "dataset.intrinsics", Kind::Numbers),
+    ("distortion", "dataset.distortion", Kind::Text),
+    ("image-size", "dataset.image_size", Kind::Text),
+    ("body-from-camera", "dataset.body_from_camera", Kind::Numbers),
+    ("cloud", "dataset.cloud", Kind::Text),
+    ("mesh", "dataset.mesh", Kind::Text),
+    ("world-from-cloud", "dataset.world_from_cloud", Kind::Text),
     ("floor-plane", "dataset.floor_plane", Kind::Numbers),
     ("plugin", "dataset.plugins.files", Kind::Texts),
     ("allow-writable-plugin", "dataset.plugins.allow_writable", Kind::Switch),
@@ -84,6 +91,7 @@ const FIELDS: [(&str, &str, Kind); 32] = [
     ("zcam-range", "depth.zcam_range_m", Kind::Numbers),
     ("tag-size", "depth.tag_size_m", Kind::Number),
     ("tag-family", "depth.tag_family", Kind::Text),
+    ("stereo-camera", "depth.stereo_camera", Kind::Text),
     ("depth-check", "depth.compare", Kind::Switch),
     ("subsets", "scoring.subsets", Kind::Counts),
 ];
@@ -223,7 +231,9 @@ mod tests {
             ("depth.zmap_interpolation", _) => "natural",
             ("depth.tag_family", _) => "36h11",
             ("scoring.align", _) => "yaw",
-            ("dataset.floor_plane", _) => "0,0,1,0",
+            ("dataset.floor_plane" | "dataset.intrinsics", _) => "1,1,1,0",
+            ("dataset.distortion", _) => "fov:0.9",
+            ("dataset.image_size", _) => "640x480",
             ("streams.initial_pose", _) => "0,0,0,0,0,0,1",
             ("depth.zcam_range_m", _) => "1,2",
             (_, Kind::Number | Kind::Numbers | Kind::Counts) => "1",

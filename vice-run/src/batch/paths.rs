@@ -20,7 +20,11 @@ pub(super) fn resolved(request: &Request, base: &Path) -> Request {
         join(&mut request.labels.file);
     }
     request.labels.noise.iter_mut().for_each(join);
-    request.dataset.calibration.iter_mut().for_each(join);
+    let own = &mut request.dataset;
+    [&mut own.calibration, &mut own.cloud, &mut own.mesh, &mut own.world_from_cloud]
+        .into_iter()
+        .flatten()
+        .for_each(join);
     request.dataset.plugins.files.iter_mut().for_each(join);
     request.streams.times.iter_mut().for_each(join);
     if let EstimateFrame::File(file) = &mut request.streams.estimate_frame {

@@ -41,6 +41,14 @@ pub enum ModelName {
     Rational,
     /// Kannala-Brandt.
     Equidistant,
+    /// Double sphere.
+    Ds,
+    /// Extended unified.
+    Eucm,
+    /// Omnidirectional, five coefficients.
+    Omni,
+    /// Field of view.
+    Fov,
 }
 
 impl KernelName {
@@ -80,7 +88,16 @@ impl std::str::FromStr for KernelName {
 
 impl ModelName {
     /// All models.
-    pub const ALL: [Self; 4] = [Self::Pinhole, Self::Radtan, Self::Rational, Self::Equidistant];
+    pub const ALL: [Self; 8] = [
+        Self::Pinhole,
+        Self::Radtan,
+        Self::Rational,
+        Self::Equidistant,
+        Self::Ds,
+        Self::Eucm,
+        Self::Omni,
+        Self::Fov,
+    ];
 
     /// The name in options and documents.
     pub const fn name(self) -> &'static str {
@@ -89,6 +106,10 @@ impl ModelName {
             Self::Radtan => "radtan",
             Self::Rational => "rational",
             Self::Equidistant => "equidistant",
+            Self::Ds => "ds",
+            Self::Eucm => "eucm",
+            Self::Omni => "omni",
+            Self::Fov => "fov",
         }
     }
 }
@@ -191,12 +212,11 @@ pub fn measure(options: &BenchOptions, progress: &Progress<'_>) -> RunResult<Ben
 
 /// The models that a kernel is measured with. Reading a file knows no camera.
 fn models(kernel: KernelName, asked: Option<ModelName>) -> Vec<Option<ModelName>> {
-    use ModelName::{Equidistant, Pinhole, Radtan, Rational};
     match (kernel, asked) {
         (KernelName::Ply, _) => vec![None],
         (_, Some(model)) => vec![Some(model)],
-        (KernelName::Zmap, None) => vec![Some(Radtan)],
-        (_, None) => [Pinhole, Radtan, Rational, Equidistant].map(Some).into(),
+        (KernelName::Zmap, None) => vec![Some(ModelName::Radtan)],
+        (_, None) => ModelName::ALL.map(Some).into(),
     }
 }
 

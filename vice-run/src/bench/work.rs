@@ -13,7 +13,7 @@ use vice_core::frames::{BodyFromCamera, Rigid, WorldFromCamera};
 use vice_core::random::Congruential;
 use vice_core::time::Stamp;
 use vice_core::track::track_batch;
-use vice_depth::{Cloud, CloudOptions, ZMapDepth, ZMapOptions, depth_image, read_ply_points};
+use vice_depth::{Cloud, CloudOptions, ZMapDepth, ZMapOptions, depth_image, read_scan_points};
 
 use super::limits::{copy_bytes, seconds};
 use super::scan::room;
@@ -69,6 +69,10 @@ fn camera(model: ModelName) -> RunResult<Camera> {
         ModelName::Equidistant => {
             ("equidistant", &[0.0034823894, 0.00071503484, -0.0020532361, 0.00020293673])
         }
+        ModelName::Ds => ("ds", &[-0.18, 0.59]),
+        ModelName::Eucm => ("eucm", &[0.63, 1.04]),
+        ModelName::Omni => ("omni", &[0.9, -0.2, 0.05, 0.0005, -0.0003]),
+        ModelName::Fov => ("fov", &[0.93]),
     };
     let model = Model::from_name(name, coefficients)?;
     Ok(Camera::new(752, 480, [458.654, 457.296, 367.215, 248.375], model)?)
@@ -172,7 +176,7 @@ impl Work {
                 let mut failed = None;
                 let mut buffer = Vec::with_capacity(*bytes);
                 let (best, read) = rounds(
-                    || seconds(|| failed = read_ply_points(&*path, &CloudOptions::default()).err()),
+                    || seconds(|| failed = read_scan_points(&*path, &CloudOptions::default()).err()),
                     || {
                         buffer.clear();
                         seconds(|| {

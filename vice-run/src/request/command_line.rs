@@ -35,6 +35,13 @@ fn options(request: &Request) -> Vec<(&'static str, String)> {
         add("plugin", Some(file.display().to_string()));
     }
     add("calibration", dataset.calibration.as_deref().map(told));
+    add("intrinsics", dataset.intrinsics.and_then(|k| numbers(&k)));
+    add("distortion", dataset.distortion.as_ref().map(ToString::to_string));
+    add("image-size", dataset.image_size.map(|size| size.to_string()));
+    add("body-from-camera", dataset.body_from_camera.as_deref().and_then(numbers));
+    add("cloud", dataset.cloud.as_deref().map(told));
+    add("mesh", dataset.mesh.as_deref().map(told));
+    add("world-from-cloud", dataset.world_from_cloud.as_deref().map(told));
     add("floor-plane", dataset.floor_plane.and_then(|p| numbers(&p)));
     add("labels", Some(told(&labels.file)));
     add("points", list(labels.points.clone()));
@@ -63,6 +70,7 @@ fn options(request: &Request) -> Vec<(&'static str, String)> {
     add("zcam-range", depth.zcam_range_m.and_then(|r| numbers(&r)));
     add("tag-size", depth.tag_size_m.map(|v| v.to_string()));
     add("tag-family", depth.tag_family.map(|f| f.name().to_string()));
+    add("stereo-camera", depth.stereo_camera.clone());
     add("depth-check", depth.compare.map(|on| if on { "on" } else { "off" }.to_string()));
     add("subsets", list(scoring.subsets.iter().map(usize::to_string).collect()));
     add("align", scoring.align.map(|a| a.name().to_string()));

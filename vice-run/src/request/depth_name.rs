@@ -20,11 +20,13 @@ pub enum DepthName {
     Mesh,
     /// AprilTags of a known size.
     Tag,
+    /// A second camera.
+    Stereo,
 }
 
 impl DepthName {
     /// All sources.
-    pub const ALL: [Self; 5] = [Self::Floor, Self::ZMap, Self::ZCam, Self::Mesh, Self::Tag];
+    pub const ALL: [Self; 6] = [Self::Floor, Self::ZMap, Self::ZCam, Self::Mesh, Self::Tag, Self::Stereo];
 
     /// The name in requests, tables and documents.
     pub const fn name(self) -> &'static str {
@@ -34,6 +36,7 @@ impl DepthName {
             Self::ZCam => "zcam",
             Self::Mesh => "mesh",
             Self::Tag => "tag",
+            Self::Stereo => "stereo",
         }
     }
 }
@@ -103,6 +106,8 @@ mod tests {
             assert_eq!(name.name().parse(), Ok(name));
             assert_eq!(serde_json::to_string(&name).unwrap(), format!("\"{name}\""));
         }
-        assert!("sonar".parse::<DepthName>().unwrap_err().contains("known: floor, zmap, zcam, mesh, tag"));
+        assert!(
+            "sonar".parse::<DepthName>().unwrap_err().contains("known: floor, zmap, zcam, mesh, tag, stereo")
+        );
     }
 }

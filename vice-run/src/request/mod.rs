@@ -8,6 +8,7 @@ mod automatic;
 mod command_line;
 mod depth_name;
 mod estimate;
+mod plain;
 mod secrets;
 mod word;
 
@@ -27,6 +28,8 @@ use vice_files::vice_toml::ViceToml;
 pub use automatic::{DEFAULT_POINTS, MOST_POINTS, is_auto, labels_shown, points_asked};
 pub use depth_name::{DepthName, ZMapInterpolation};
 pub use estimate::{Anchor, EstimateFrame, EstimateSpec, IMU_EULER, ReferenceSpec};
+
+pub use plain::{ImageSize, LensSpec};
 
 pub(crate) use word::{seconds, seconds_option};
 
@@ -77,13 +80,47 @@ pub struct DatasetSpec {
     /// Camera; `None`: the first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<String>,
-    /// Calibration file that overrides the data set's: TOML, or a Kalibr camchain.
+    /// Calibration file that overrides the data set's: TOML, or what another tool wrote.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
         serialize_with = "word::path_option::serialize"
     )]
     pub calibration: Option<PathBuf>,
+    /// Intrinsics that override the calibration's: fx, fy, cx, cy in pixels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intrinsics: Option<[f64; 4]>,
+    /// Lens that overrides the calibration's, such as `radtan:k1,k2,p1,p2`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distortion: Option<LensSpec>,
+    /// Columns and rows of the images that the calibration is of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub image_size: Option<ImageSize>,
+    /// The camera's place in the body: x, y, z in metres and the quaternion x, y, z, w, or a matrix row by row.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_from_camera: Option<Vec<f64>>,
+    /// Scan of the scene in place of the data set's: PLY, PCD, LAS or LAZ.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "word::path_option::serialize"
+    )]
+    pub cloud: Option<PathBuf>,
+    /// Faces of the scene in place of the data set's: a PLY file.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "word::path_option::serialize"
+    )]
+    pub mesh: Option<PathBuf>,
+    /// File with the place of the cloud and the mesh in the world; `None`: they are in the world's frame, or what the data
+    /// set says of its own.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "word::path_option::serialize"
+    )]
+    pub world_from_cloud: Option<PathBuf>,
     /// Floor plane `n·p + d = 0` in the world in place of the data set's: nx, ny, nz, d in metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub floor_plane: Option<[f64; 4]>,
@@ -245,6 +282,9 @@ pub struct DepthSpec {
     /// Family of the tags; `None`: 36h11.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tag_family: Option<TagFamily>,
+    /// Second camera of the pair for the depth source stereo; `None`: the only other one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stereo_camera: Option<String>,
     /// Whether the depths at the key frames are compared with what a depth camera or scan of the recording says, where
     /// these are not asked for themselves; `None`: yes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -338,7 +378,10 @@ impl Request {
         if let ReferenceSpec::Named(EstimateSpec::Named(name)) = &self.streams.reference {
             files.push(PathBuf::from(name));
         }
-        files.extend(self.streams.times.iter().chain(&self.dataset.calibration).cloned());
+        let DatasetSpec { calibration, cloud, mesh, world_from_cloud, .. } = &self.dataset;
+        files.extend(
+            [calibration, cloud, mesh, world_from_cloud, &self.streams.times].into_iter().flatten().cloned(),
+        );
         files.extend(beside(&self.dataset.path));
         if let EstimateFrame::File(file) = &self.streams.estimate_frame {
             files.push(file.clone());
@@ -353,6 +396,7 @@ impl Request {
     pub fn check(&self) -> RunResult<()> {
         self.protocol.check()?;
         self.depth.check(&[])?;
+        self.depth.check_scene(&self.dataset)?;
         self.streams.check_names()?;
         points_asked(&self.labels.file)?;
         if self.streams.max_gap < Span::ZERO {
@@ -420,12 +464,24 @@ impl DepthSpec {
         if self.sources.is_empty() { vec![DepthName::Floor] } else { self.sources.clone() }
     }
 
+    /// Refuses a mesh that no source looks at.
+    ///
+    /// # Errors
+    /// [`RunError`] of the kind usage.
+    pub fn check_scene(&self, dataset: &DatasetSpec) -> RunResult<()> {
+        if dataset.mesh.is_some() && !self.names().contains(&DepthName::Mesh) {
+            return Err(RunError::usage("mesh", "is of the depth source mesh, which is not asked")
+                .advise("add mesh to `depth`, or leave it out"));
+        }
+        Ok(())
+    }
+
     /// Refuses settings of sources that nobody asks for, here or in `also`.
     ///
     /// # Errors
     /// [`RunError`] of the kind usage.
     pub fn check(&self, also: &[DepthName]) -> RunResult<()> {
-        use DepthName::{Tag, ZCam, ZMap};
+        use DepthName::{Stereo, Tag, ZCam, ZMap};
         let settings = [
             ("zmap-occlusion", self.zmap_occlusion.is_some(), ZMap),
             ("zmap-interpolation", self.zmap_interpolation.is_some(), ZMap),
@@ -433,6 +489,7 @@ impl DepthSpec {
             ("zcam-range", self.zcam_range_m.is_some(), ZCam),
             ("tag-size", self.tag_size_m.is_some(), Tag),
             ("tag-family", self.tag_family.is_some(), Tag),
+            ("stereo-camera", self.stereo_camera.is_some(), Stereo),
         ];
         let names = self.names();
         for (field, given, source) in settings {

@@ -15,7 +15,11 @@ impl Request {
         let tell_spec = |spec: &mut EstimateSpec| *spec = EstimateSpec::from(spec.to_string());
         tell(&mut request.dataset.path);
         tell(&mut request.labels.file);
-        request.dataset.calibration.iter_mut().for_each(tell);
+        let own = &mut request.dataset;
+        [&mut own.calibration, &mut own.cloud, &mut own.mesh, &mut own.world_from_cloud]
+            .into_iter()
+            .flatten()
+            .for_each(tell);
         request.streams.times.iter_mut().for_each(tell);
         if let EstimateFrame::File(file) = &mut request.streams.estimate_frame {
             tell(file);

@@ -11,6 +11,13 @@ pub(crate) fn everything() -> Request {
     request.dataset.format = Some("locobot".to_string());
     request.dataset.set.insert("stamps".to_string(), "record".to_string());
     request.dataset.calibration = Some("cal.toml".into());
+    request.dataset.intrinsics = Some([500.0, 501.0, 320.5, 240.0]);
+    request.dataset.distortion = Some("radtan:0.1,-0.2,0,0".parse().unwrap());
+    request.dataset.image_size = Some("640x480".parse().unwrap());
+    request.dataset.body_from_camera = Some(vec![0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    request.dataset.cloud = Some("hall.laz".into());
+    request.dataset.mesh = Some("hall.ply".into());
+    request.dataset.world_from_cloud = Some("place.txt".into());
     request.dataset.floor_plane = Some([0.0, 0.0, 1.0, -0.1]);
     request.labels.points = vec!["a".to_string()];
     request.labels.observations = Observations::Manual;
@@ -53,7 +60,9 @@ fn unknown_fields_are_refused() {
 fn the_command_line_says_what_is_not_the_default() {
     assert_eq!(
         everything().command_line(),
-        "vice evaluate 'my run' --format locobot --set stamps=record --calibration cal.toml --floor-plane 0,0,1,-0.1 \
+        "vice evaluate 'my run' --format locobot --set stamps=record --calibration cal.toml --intrinsics 500,501,320.5,240 \
+         --distortion radtan:0.1,-0.2,0,0,0 --image-size 640x480 --body-from-camera 0.1,0,0,0,0,0,1 --cloud hall.laz --mesh hall.ply \
+         --world-from-cloud place.txt --floor-plane 0,0,1,-0.1 \
          --labels labels.csv --points a --observations manual --fps 10 --start 1.000000001 --duration 30 \
          --estimate odom,rel:motions.txt,imu-euler --reference truth.txt --estimate-frame camera --time-offset -0.05 \
          --anchor estimate --initial-pose 1,2,3,0,0,0,1 --depth zmap,tag --zmap-interpolation natural \

@@ -131,6 +131,7 @@ fn request(s: &Settings, dataset: &DatasetPart, pixel: &[PixelPart]) -> Request 
             zcam_range_m: <[f64; 2]>::try_from(numbers("zcam-range")).ok(),
             tag_size_m: other("tag-size").and_then(|v| v.parse().ok()),
             tag_family: other("tag-family").and_then(|v| v.parse().ok()),
+            stereo_camera: None,
             compare: Some(false),
         },
         scoring: Scoring {

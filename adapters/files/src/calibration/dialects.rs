@@ -7,7 +7,8 @@ use vice_core::suspicion::Suspicion;
 use vice_core::time::Span;
 
 use super::keys::{self, Key};
-use super::{CalibrationFile, CameraOverride, in_camera, tree};
+use super::lens::{self, Numbers};
+use super::{CalibrationFile, CameraOverride, basalt, in_camera, tree};
 use crate::rigid_file::Matrix4;
 
 /// How far two statements of the same transform may be apart: metres and radians.
@@ -15,18 +16,25 @@ const SAME_TRANSFORM: f64 = 1e-3;
 
 /// A camera as far as its entry says.
 #[derive(Default)]
-struct Entry {
-    camera: CameraOverride,
+pub(super) struct Entry {
+    pub(super) camera: CameraOverride,
     camera_from_previous: Option<Rigid<Camera, Camera>>,
-    time_shift: Option<Span>,
+    pub(super) time_shift: Option<Span>,
     topic: Option<String>,
     name: Option<String>,
-    unused: Vec<String>,
+    pub(super) unused: Vec<String>,
 }
 
 pub(super) fn parse(text: &str) -> DataResult<CalibrationFile> {
     let root = tree::read(text)?;
     let mut file = CalibrationFile::new();
+    if let Some(calibration) = basalt::found(&root) {
+        for (number, entry) in basalt::cameras(calibration)?.into_iter().enumerate() {
+            add(&mut file, &format!("cam{number}"), entry);
+        }
+        file.unused.extend(basalt::unused(calibration));
+        return Ok(file);
+    }
     if keys::describes_camera(&root) {
         let entry = entry_of(&root)?;
         if entry.camera == CameraOverride::default() && entry.time_shift.is_none() {
@@ -88,7 +96,7 @@ fn add(file: &mut CalibrationFile, name: &str, entry: Entry) {
             Suspicion::new(
                 "time-shift-applied",
                 name,
-                "timeshift_cam_imu is added to the stamps of the estimates",
+                "the camera's shift against the IMU is added to the stamps of the estimates",
             )
             .evidence(format!(
                 "{} s, as --time-offset {} would",
@@ -148,16 +156,16 @@ fn weighty(key: &str) -> DataError {
     .hint("take it out if it does not matter; extrinsics are read as T_cam_imu, T_imu_cam, T_BS or T_cn_cnm1")
 }
 
-fn in_camera_kind(name: &str, error: &DataError) -> DataError {
+pub(super) fn in_camera_kind(name: &str, error: &DataError) -> DataError {
     DataError::of_kind(error.kind(), format!("[{name}]: {}", error.problem()))
 }
 
-fn list(key: &str, value: &Value) -> DataResult<Vec<f64>> {
+pub(super) fn list(key: &str, value: &Value) -> DataResult<Vec<f64>> {
     tree::numbers(value)
         .ok_or_else(|| DataError::new(format!("is not the YAML expected: {key} is no list of numbers")))
 }
 
-fn one(key: &str, value: &Value) -> DataResult<f64> {
+pub(super) fn one(key: &str, value: &Value) -> DataResult<f64> {
     tree::number(value)
         .filter(|v| v.is_finite())
         .ok_or_else(|| DataError::new(format!("is not the YAML expected: {key} is no number")))
@@ -179,7 +187,7 @@ fn transform<A, B>(key: &str, value: &Value) -> DataResult<Rigid<A, B>> {
 }
 
 /// Sides of an image.
-fn side(key: &str, value: f64) -> DataResult<u32> {
+pub(super) fn side(key: &str, value: f64) -> DataResult<u32> {
     if value.fract() == 0.0 && (0.0..f64::from(u32::MAX)).contains(&value) {
         Ok(value as u32)
     } else {
@@ -204,47 +212,39 @@ fn intrinsics_of_matrix(key: &str, value: &Value) -> DataResult<[f64; 4]> {
 }
 
 fn entry_of(map: &Map<String, Value>) -> DataResult<Entry> {
-    if let Some(error) = model_problem(map) {
-        return Err(error);
-    }
+    let (projection, kept_by) = lens::projection(map)?;
     let mut entry = Entry::default();
     let mut single: [Option<f64>; 4] = [None; 4];
     let mut coefficients: [Option<f64>; 8] = [None; 8];
+    let mut mirror = Vec::new();
+    let mut listed: Option<(String, Vec<f64>)> = None;
     let (mut width, mut height) = (None, None);
     let mut fisheye = false;
-    let mut camera_model = None;
     // Two statements of the same thing must agree.
     let mut place: Option<(String, BodyFromCamera)> = None;
     for (key, value) in map {
         match keys::of(key) {
-            Key::CameraModel => camera_model = value.as_str().map(str::to_string),
+            Key::CameraModel => {}
             Key::DistortionModel => entry.camera.model = value.as_str().map(str::to_lowercase),
-            Key::Intrinsics => {
-                let values = list(key, value)?;
-                let count = values.len();
-                let found = match <[f64; 4]>::try_from(values) {
-                    Ok(found) => found,
-                    Err(values) if values.len() == 9 => intrinsics_of_matrix(key, value)?,
-                    Err(_) => {
-                        return Err(DataError::new(format!(
-                            "is not the YAML expected: {key} are fx, fy, cx, cy: 4 numbers, not {count}"
-                        )));
-                    }
-                };
-                set(&mut entry.camera.intrinsics, key, found)?;
-            }
+            Key::Intrinsics => match list(key, value)? {
+                values if values.len() == 9 => {
+                    set(&mut entry.camera.intrinsics, key, intrinsics_of_matrix(key, value)?)?
+                }
+                values => listed = Some((key.clone(), values)),
+            },
             Key::CameraMatrix => set(&mut entry.camera.intrinsics, key, intrinsics_of_matrix(key, value)?)?,
             Key::Intrinsic(i) => single[i] = Some(one(key, value)?),
             Key::Coefficient(i) => coefficients[i] = Some(one(key, value)?),
-            Key::Projection | Key::DistortionByName => {
+            Key::Projection | Key::DistortionByName | Key::Mirror => {
                 let Value::Object(parts) = value else {
                     return Err(DataError::new(format!("{key} names no parameters")));
                 };
                 for (part, value) in parts {
-                    match keys::of(part) {
-                        Key::Intrinsic(i) => single[i] = Some(one(part, value)?),
-                        Key::Coefficient(i) => coefficients[i] = Some(one(part, value)?),
-                        _ => return Err(weighty(part)),
+                    let value = one(part, value)?;
+                    match projection.part(keys::of(key), part).ok_or_else(|| weighty(part))? {
+                        Key::Intrinsic(i) => single[i] = Some(value),
+                        Key::Coefficient(i) => coefficients[i] = Some(value),
+                        _ => mirror.push((part.to_lowercase(), value)),
                     }
                 }
             }
@@ -294,10 +294,10 @@ fn entry_of(map: &Map<String, Value>) -> DataResult<Entry> {
     } else if single.iter().any(Option::is_some) {
         return Err(DataError::new("of fx, fy, cx and cy not all are given"));
     }
-    let named = coefficients.iter().rposition(Option::is_some);
-    if let (Some(last), None) = (named, &entry.camera.distortion) {
-        entry.camera.distortion =
-            Some(coefficients[..=last.max(3)].iter().map(|c| c.unwrap_or(0.0)).collect());
+    if let Some((key, values)) = listed {
+        let (own, [fx, fy, cx, cy]) = projection.split(&key, &values)?;
+        mirror.extend(own);
+        set(&mut entry.camera.intrinsics, &key, [fx, fy, cx, cy])?;
     }
     entry.camera.resolution = match (width, height) {
         (Some(width), Some(height)) => Some([width, height]),
@@ -305,7 +305,8 @@ fn entry_of(map: &Map<String, Value>) -> DataResult<Entry> {
         _ => return Err(DataError::new("of width and height only one is given")),
     };
     entry.camera.body_from_camera = place.map(|(_, found)| found);
-    settle_model(&mut entry.camera, fisheye, camera_model.as_deref());
+    let numbers = Numbers { coefficients, mirror: &mirror };
+    lens::settle(&mut entry.camera, projection, &kept_by, fisheye, &numbers)?;
     Ok(entry)
 }
 
@@ -325,34 +326,4 @@ fn set(known: &mut Option<[f64; 4]>, key: &str, found: [f64; 4]) -> DataResult<(
 fn roi_is_whole(value: &Value) -> bool {
     let Value::Object(map) = value else { return false };
     !map.is_empty() && !map.contains_key("data") && map.values().all(tree::says_nothing)
-}
-
-/// Kalibr's `omni`, `eucm` and `ds` have further intrinsics that the pinhole models do not.
-fn model_problem(map: &Map<String, Value>) -> Option<DataError> {
-    let (key, model) = map.iter().find(|(key, _)| keys::of(key) == Key::CameraModel)?;
-    let model = model.as_str()?;
-    let known = ["pinhole", "kannala_brandt", "kannalabrandt8", "perspective", "pinhole_camera"];
-    (!known.contains(&model.to_lowercase().as_str()))
-        .then(|| DataError::new(format!("unknown {key} `{model}`; known: pinhole")))
-}
-
-/// The lens where the file does not name it as such.
-fn settle_model(camera: &mut CameraOverride, fisheye: bool, projection: Option<&str>) {
-    let kannala = projection.is_some_and(|p| p.to_lowercase().starts_with("kannala"));
-    match camera.model.as_deref() {
-        // Kalibr writes four zeros where there is no distortion.
-        Some("none") => camera.distortion = Some(Vec::new()),
-        Some("equi") => camera.model = Some("equidistant".to_string()),
-        Some(_) => {}
-        None if fisheye || kannala => camera.model = Some("equidistant".to_string()),
-        // OpenCV's order, whose name is how many there are.
-        None => {
-            if let Some(distortion) = &camera.distortion
-                && camera.intrinsics.is_some()
-            {
-                let used = distortion.iter().rposition(|c| *c != 0.0).map_or(0, |last| last + 1);
-                camera.model = Some(if used > 5 { "rational" } else { "radtan" }.to_string());
-            }
-        }
-    }
 }

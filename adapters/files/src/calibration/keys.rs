@@ -1,4 +1,5 @@
-//! What the keys of calibration files mean, in the dialects of Kalibr, OpenVINS, EuRoC, ROS, OpenCV, VINS and ORB-SLAM.
+//! What the keys of calibration files mean, in the dialects of Kalibr, OpenVINS, EuRoC, ROS, OpenCV, VINS and
+//! ORB-SLAM.
 //!
 //! A key about geometry, time or size that is not known is refused by its name: passed over, it would leave the data
 //! set's own value in its place without a word. Others are listed once.
@@ -8,7 +9,7 @@ use serde_json::Value;
 /// What a key says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Key {
-    /// The projection: only pinhole.
+    /// The projection: a pinhole, or one with parameters of its own.
     CameraModel,
     /// The lens.
     DistortionModel,
@@ -22,6 +23,8 @@ pub(super) enum Key {
     Projection,
     /// Coefficients of the lens.
     Distortion,
+    /// Parameters of the projection itself by their names, such as xi.
+    Mirror,
     /// k1, k2, p1, p2 and so on by their names.
     DistortionByName,
     /// One of k1, k2, p1, p2, k3 to k6, by its place.
@@ -52,7 +55,7 @@ pub(super) enum Key {
     Unknown,
 }
 
-const HARMLESS: [&str; 63] = [
+const HARMLESS: [&str; 65] = [
     "cam_overlaps",
     "camera_overlaps",
     "overlaps",
@@ -102,6 +105,9 @@ const HARMLESS: [&str; 63] = [
     "file.version",
     "bf",
     "thdepth",
+    // The size that ORB-SLAM scales its images to.
+    "newwidth",
+    "newheight",
     "depthmapfactor",
     "rgb",
     "stereo.thdepth",
@@ -168,6 +174,7 @@ pub(super) fn of(key: &str) -> Key {
         "intrinsics" | "intrinsic" => Key::Intrinsics,
         "cameramatrix" | "k" | "intrinsicmatrix" | "intrinsicsmatrix" | "mtx" => Key::CameraMatrix,
         "projectionparameters" => Key::Projection,
+        "mirrorparameters" => Key::Mirror,
         "fx" => Key::Intrinsic(0),
         "fy" => Key::Intrinsic(1),
         "cx" => Key::Intrinsic(2),
@@ -222,6 +229,7 @@ pub(super) fn describes_camera(map: &serde_json::Map<String, Value>) -> bool {
                 | Key::CameraMatrix
                 | Key::Intrinsic(_)
                 | Key::Projection
+                | Key::Mirror
                 | Key::Distortion
                 | Key::DistortionByName
                 | Key::Resolution

@@ -5,19 +5,23 @@
 //! time_offset_s = 0.02             # added to the stamps of an estimate
 //!
 //! [cam0]
-//! model = "radtan"                 # pinhole, radtan, rational, equidistant
+//! model = "radtan"                 # pinhole, radtan, rational, equidistant, ds, eucm, omni, fov
 //! resolution = [752, 480]
 //! intrinsics = [458.654, 457.296, 367.215, 248.375]   # fx, fy, cx, cy in pixels
 //! distortion = [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]
 //! body_from_camera = [0, -1, 0, 0,  1, 0, 0, 0,  0, 0, 1, 0,  0, 0, 0, 1]   # row by row, metres
 //! ```
 //! or what other tools write, told by its keys: the camchain of Kalibr (`T_cam_imu`, `T_cn_cnm1`) and of OpenVINS
-//! (`T_imu_cam`), EuRoC's `sensor.yaml` (`T_BS`), `camera_info` of ROS, OpenCV's YAML and XML, ORB-SLAM and VINS. A key
+//! (`T_imu_cam`), EuRoC's `sensor.yaml` (`T_BS`), `camera_info` of ROS, OpenCV's YAML and XML, ORB-SLAM, VINS (camodocal),
+//! Basalt's JSON, and the cameras of COLMAP, text or binary, whose (0, 0) is the corner of the image. A key
 //! about geometry, time or size is used or refused by its name; others that are not known are in
 //! [`CalibrationFile::suspicions`]. `timeshift_cam_imu` is the clock offset of its camera.
 
+mod basalt;
+mod colmap;
 mod dialects;
 mod keys;
+mod lens;
 mod toml_file;
 mod tree;
 
@@ -36,7 +40,8 @@ use crate::yaml;
 
 /// What is read, for messages.
 const DIALECTS: &str = "a calibration is TOML (named .toml), a camchain of Kalibr or OpenVINS, a sensor.yaml, a camera_info \
-                        of ROS, or OpenCV's YAML or XML";
+                        of ROS, OpenCV's YAML or XML, settings of ORB-SLAM or VINS, Basalt's JSON, or COLMAP's \
+                        cameras.txt or cameras.bin";
 
 /// A calibration, by camera.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -86,8 +91,16 @@ impl CalibrationFile {
     /// each other, or a key about geometry, time or size that is not known.
     pub fn read(path: impl AsRef<Path>) -> DataResult<Self> {
         let path = path.as_ref();
-        let text = yaml::read_text(path)?;
-        let parsed = if is_toml(path) { toml_file::parse(&text) } else { dialects::parse(&text) };
+        let parsed = if is_binary(path) {
+            colmap::from_bytes(&yaml::read_bytes(path)?)
+        } else {
+            let text = yaml::read_text(path)?;
+            match &text {
+                text if is_toml(path) => toml_file::parse(text),
+                text if colmap::is_text(text) => colmap::from_text(text),
+                text => dialects::parse(text),
+            }
+        };
         let mut file = parsed.map_err(|e| e.at(path))?;
         file.path = path.to_path_buf();
         file.put_into_words();
@@ -261,6 +274,15 @@ impl CameraOverride {
         }
     }
 
+    /// The camera: `base`, the data set's, with what is said here in its place; `None` where nothing is said of the
+    /// intrinsics.
+    ///
+    /// # Errors
+    /// [`DataError`] if what is left out is not in `base` either, or the parts do not fit.
+    pub fn camera(&self, base: Option<&Camera>) -> DataResult<Option<Camera>> {
+        if self.has_intrinsics() { self.combine(base).map(Some) } else { Ok(None) }
+    }
+
     fn has_intrinsics(&self) -> bool {
         self.model.is_some()
             || self.resolution.is_some()
@@ -313,9 +335,16 @@ impl CameraOverride {
     }
 }
 
+/// COLMAP's binary list of cameras, by its name.
+fn is_binary(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("bin"))
+}
+
 fn in_camera(name: &str, problem: &impl std::fmt::Display) -> DataError {
     DataError::new(format!("[{name}]: {problem}"))
 }
 
+#[cfg(test)]
+mod dialect_tests;
 #[cfg(test)]
 mod tests;

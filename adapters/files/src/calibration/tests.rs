@@ -61,7 +61,7 @@ fn what_cannot_be_a_camera_is_refused_when_it_is_read() {
         assert!(error.contains(expected) && error.contains(name), "{error}");
     };
     says("c.toml", "[cam0]\nintrinsics = [-458, 457, 367, 248]\n", "focal length fx = -458 is not positive");
-    says("c.toml", "[cam0]\nmodel = 'fov'\n", "unknown camera model `fov`");
+    says("c.toml", "[cam0]\nmodel = 'fishbowl'\n", "unknown camera model `fishbowl`");
     says("c.toml", "[cam0]\nmodel = 'radtan'\ndistortion = [1]\n", "takes 4 or 5");
     says("c.toml", "[cam0]\nresolution = [0, 480]\n", "0x480 is empty");
     says("c.toml", "[cam0]\nintrinsics = [nan, 457, 367, 248]\n", "not finite");
@@ -73,11 +73,11 @@ fn what_cannot_be_a_camera_is_refused_when_it_is_read() {
     says("c.toml", "[cam0]\nbody_from_camera = [1, 0]\n", "has 2 numbers");
     says(
         "c.yaml",
-        "cam0: {camera_model: omni, intrinsics: [1, 2, 3, 4, 5]}\n",
-        "unknown camera_model `omni`",
+        "cam0: {camera_model: fishbowl, intrinsics: [1, 2, 3, 4, 5]}\n",
+        "unknown camera_model `fishbowl`",
     );
     says("c.yaml", "cam0: {camera_model: pinhole, intrinsics: [1, 2, 3, 4, 5]}\n", "not 5");
-    says("c.yaml", "cam0: {distortion_model: fov, distortion_coeffs: [1]}\n", "unknown camera model `fov`");
+    says("c.yaml", "cam0: {distortion_model: fish, distortion_coeffs: [1]}\n", "unknown camera model `fish`");
     says("c.yaml", "cam0: {intrinsics: [458, -1, 367, 248]}\n", "focal length fy = -1");
     says("c.yaml", "just text\n", "is not the YAML expected");
     says("c.yaml", "\n", "the file is empty");
@@ -254,7 +254,7 @@ fn keys_about_geometry_time_and_size_are_never_passed_over() {
         ("image_width: 640\nintrinsics: [1, 1, 1, 1]\n", "only one is given"),
         ("intrinsics: [1, 1, 1, 1]\nK: [2, 0, 1, 0, 1, 1, 0, 0, 1]\n", "contradict"),
         ("relative_config_imucam: kalibr.yaml\n", "holds no camera"),
-        ("model_type: MEI\nmirror_parameters: {xi: 1.0}\n", "unknown model_type `MEI`"),
+        ("model_type: SCARAMUZZA\npoly_parameters: {p0: 1.0}\n", "unknown model_type `SCARAMUZZA`"),
     ] {
         let error = read_as("c.yaml", text).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");

@@ -10,6 +10,14 @@ use crate::yaml;
 pub(super) fn read(text: &str) -> DataResult<Map<String, Value>> {
     let value = if text.trim_start_matches('\u{feff}').trim_start().starts_with('<') {
         from_xml(text)?
+    } else if text.trim_start_matches('\u{feff}').trim_start().starts_with('{') && text.contains("\"value0\"")
+    {
+        // JSON that YAML's readers do not take, such as with tabs.
+        serde_json::from_str(text.trim_start_matches('\u{feff}')).map_err(|e| {
+            DataError::new(format!("is not the JSON expected: {e}"))
+                .line(e.line() as u64)
+                .hint(super::DIALECTS)
+        })?
     } else {
         yaml::parse(text).map_err(|e| e.hint(super::DIALECTS))?
     };

@@ -282,7 +282,7 @@ fn describe(folder: &Path, settings: &Settings) -> DataResult<Description> {
             .map_err(|e| DataError::new(format!("ply_file_path: {}", e.problem())).at(&known.path))?;
         found.cloud = Some(Box::new(move || {
             Ok(CloudRef {
-                source: CloudSource::Ply(path.clone()),
+                source: CloudSource::File(path.clone()),
                 world_from_cloud: Rigid::<World, _>::identity(),
             })
         }));

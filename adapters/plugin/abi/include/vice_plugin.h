@@ -73,6 +73,10 @@ extern "C" {
 #define VICE_MODEL_RADTAN 1      /* k1 k2 p1 p2, or k1 k2 p1 p2 k3: Brown-Conrady, ROS plumb_bob */
 #define VICE_MODEL_RATIONAL 2    /* k1 k2 p1 p2 k3 k4 k5 k6: ROS rational_polynomial */
 #define VICE_MODEL_EQUIDISTANT 3 /* k1 k2 k3 k4: Kannala-Brandt, OpenCV fisheye */
+#define VICE_MODEL_DS 4          /* xi alpha: double sphere; since version 2, as those below */
+#define VICE_MODEL_EUCM 5        /* alpha beta: extended unified */
+#define VICE_MODEL_OMNI 6        /* xi k1 k2 p1 p2: Mei, OpenCV omnidir */
+#define VICE_MODEL_FOV 7         /* w, radians: Devernay, ATAN */
 #define VICE_MAX_COEFFICIENTS 8
 
 /* Flags of a camera. */

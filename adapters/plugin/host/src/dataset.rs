@@ -266,7 +266,7 @@ impl Dataset for PluginDataset {
                 let source = match cloud.kind {
                     // SAFETY: the plugin's promise.
                     contract::CLOUD_PLY => {
-                        CloudSource::Ply(unsafe { border::path(cloud.ply_path, "the path") }?)
+                        CloudSource::File(unsafe { border::path(cloud.ply_path, "the path") }?)
                     }
                     contract::CLOUD_POINTS => {
                         // SAFETY: the plugin's promise.

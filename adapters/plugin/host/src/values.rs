@@ -41,6 +41,10 @@ pub(crate) fn camera(camera: &contract::Camera) -> Result<Camera, Fault> {
         contract::MODEL_RADTAN => "radtan",
         contract::MODEL_RATIONAL => "rational",
         contract::MODEL_EQUIDISTANT => "equidistant",
+        contract::MODEL_DS => "ds",
+        contract::MODEL_EUCM => "eucm",
+        contract::MODEL_OMNI => "omni",
+        contract::MODEL_FOV => "fov",
         other => return Err(format!("camera model {other} is none of the contract's")),
     };
     let model = Model::from_name(name, given).map_err(text)?;

@@ -12,7 +12,7 @@ use std::time::Instant;
 use serde_json::Value;
 use vice_core::camera::{Camera, Model, Pixel};
 use vice_core::frames::{Rigid, WorldFromCamera};
-use vice_depth::{Cloud, CloudOptions, ZMapDepth, ZMapOptions, depth_image, read_ply_points};
+use vice_depth::{Cloud, CloudOptions, ZMapDepth, ZMapOptions, depth_image, read_scan_points};
 use vice_track::{Pyramid, corners, track_translation};
 
 use crate::files::{Files, POSES, SCAN_POINTS};
@@ -120,8 +120,8 @@ impl Ours {
         let camera = Camera::new(752, 480, [458.654, 457.296, 367.215, 248.375], Model::Pinhole)?;
         let (ply, zmap) = vice_benches::in_one_thread(|| -> Result<(f64, f64)> {
             let options = CloudOptions::default();
-            let ply = best(3, || Ok(read_ply_points(&files.scan, &options).map(drop)?))?;
-            let cloud = Arc::new(Cloud::read_ply(&files.scan, &options)?);
+            let ply = best(3, || Ok(read_scan_points(&files.scan, &options).map(drop)?))?;
+            let cloud = Arc::new(Cloud::read(&files.scan, &options)?);
             let keyframe = vice_benches::keyframe(&camera, WorldFromCamera::identity());
             let without = ZMapOptions { occlusion: false, ..ZMapOptions::default() };
             let source = ZMapDepth::new(cloud, Rigid::identity(), without);

@@ -36,6 +36,22 @@ macro_rules! with_lens {
                 let $bound = Bound::new($camera, *lens);
                 $then
             }
+            Model::DoubleSphere(lens) => {
+                let $bound = Bound::new($camera, *lens);
+                $then
+            }
+            Model::ExtendedUnified(lens) => {
+                let $bound = Bound::new($camera, *lens);
+                $then
+            }
+            Model::Omnidirectional(lens) => {
+                let $bound = Bound::new($camera, *lens);
+                $then
+            }
+            Model::FieldOfView(lens) => {
+                let $bound = Bound::new($camera, *lens);
+                $then
+            }
         }
     }};
 }

@@ -6,7 +6,7 @@ use crate::frames::{self, Rigid, World};
 
 /// All models, and lenses that fold back inside the image.
 pub(crate) fn lenses() -> Vec<(&'static str, Camera)> {
-    let lenses: [(&str, [f64; 4], &[f64]); 8] = [
+    let lenses: [(&str, [f64; 4], &[f64]); 17] = [
         ("pinhole", [665.1, 665.1, 511.5, 383.5], &[]),
         (
             "radtan",
@@ -23,6 +23,16 @@ pub(crate) fn lenses() -> Vec<(&'static str, Camera)> {
             &[0.0034823894, 0.00071503484, -0.0020532361, 0.00020293673],
         ),
         ("equidistant", [250.0, 250.0, 376.0, 240.0], &[-0.1, 0.0, 0.0, 0.0]),
+        // Two of the calibrations in the paper of the double sphere, one that folds back and one that has a pole.
+        ("ds", [313.21, 313.21, 376.0, 240.0], &[-0.18, 0.59]),
+        ("ds", [158.0, 158.1, 370.0, 245.0], &[-0.27, 0.57]),
+        ("ds", [150.0, 150.0, 376.0, 240.0], &[-0.6, 0.7]),
+        ("ds", [150.0, 150.0, 376.0, 240.0], &[-0.5, 0.2]),
+        ("eucm", [460.0, 460.1, 366.0, 248.0], &[0.63, 1.04]),
+        ("eucm", [220.0, 220.1, 366.0, 248.0], &[0.4, 1.2]),
+        ("omni", [870.0, 871.0, 370.0, 243.0], &[1.6, -0.2, 0.05, 0.0005, -0.0003]),
+        ("omni", [600.0, 600.0, 370.0, 243.0], &[0.9, -0.5, 0.0, 0.0, 0.0]),
+        ("fov", [380.0, 381.0, 370.0, 243.0], &[0.93]),
     ];
     let camera = |(name, k, c)| (name, Camera::new(752, 480, k, Model::from_name(name, c).unwrap()).unwrap());
     lenses.map(camera).into()
@@ -193,6 +203,10 @@ fn a_fixed_number_of_steps_is_enough_all_over_the_image() {
             Model::Radtan(lens) => quick_share(&camera, lens),
             Model::Rational(lens) => quick_share(&camera, lens),
             Model::Equidistant(lens) => quick_share(&camera, lens),
+            Model::DoubleSphere(lens) => quick_share(&camera, lens),
+            Model::ExtendedUnified(lens) => quick_share(&camera, lens),
+            Model::Omnidirectional(lens) => quick_share(&camera, lens),
+            Model::FieldOfView(lens) => quick_share(&camera, lens),
         };
         let reach = camera.seed.max_rd2.sqrt();
         println!("{name}: {:.1} % of the pixels, residual {worst:.1e}, seed up to {reach:.2}", 100.0 * quick);

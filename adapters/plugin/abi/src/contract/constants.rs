@@ -40,6 +40,14 @@ pub const MODEL_RADTAN: i32 = 1;
 pub const MODEL_RATIONAL: i32 = 2;
 /// k1 k2 k3 k4.
 pub const MODEL_EQUIDISTANT: i32 = 3;
+/// xi alpha; since version 2.
+pub const MODEL_DS: i32 = 4;
+/// alpha beta; since version 2.
+pub const MODEL_EUCM: i32 = 5;
+/// xi k1 k2 p1 p2; since version 2.
+pub const MODEL_OMNI: i32 = 6;
+/// w, radians; since version 2.
+pub const MODEL_FOV: i32 = 7;
 /// Most coefficients that a model has.
 pub const MAX_COEFFICIENTS: usize = 8;
 

@@ -69,8 +69,8 @@ impl Check<'_> {
         match dataset.cloud() {
             Ok(None) => self.missing("no point cloud: `--depth zmap` and `--depth mesh` will not work"),
             Ok(Some(cloud)) => match cloud.source {
-                CloudSource::Ply(path) if path.is_file() => self.good(format!("a scan: {}", path.display())),
-                CloudSource::Ply(path) => self.fault(format!("the scan {} is no file", path.display())),
+                CloudSource::File(path) if path.is_file() => self.good(format!("a scan: {}", path.display())),
+                CloudSource::File(path) => self.fault(format!("the scan {} is no file", path.display())),
                 CloudSource::Points(points) if points.is_empty() => {
                     self.fault("a scan of no points: there should be none");
                 }

@@ -29,7 +29,7 @@ pub(in crate::export) unsafe extern "C" fn cloud(
             owner: std::ptr::null_mut(),
         };
         match found.source {
-            CloudSource::Ply(path) => {
+            CloudSource::File(path) => {
                 let held = Texts::new([path.into_os_string().into_encoded_bytes()].into_iter());
                 cloud.ply_path = held.texts[0];
                 cloud.owner = owned::give(held);

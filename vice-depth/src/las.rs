@@ -1,0 +1,120 @@
+//! LAS and LAZ files, as laser scanners and surveyors have them: the points of a scan, metres.
+//!
+//! They store whole numbers with a scale and an offset for each axis, so that coordinates of a map lose nothing; they are
+//! handed on in double precision.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use las::{PointDataBuilder, Reader};
+use vice_core::error::{DataError, DataResult};
+
+use crate::ply::PointSink;
+
+/// Points that are decoded at once.
+const PIECE_POINTS: u64 = 1 << 16;
+
+/// Reads the points of a file that is `length` bytes long.
+pub(crate) fn read_points(file: File, length: Option<u64>, sink: &mut impl PointSink) -> DataResult<()> {
+    let mut reader = checked("the header", || Reader::new(BufReader::new(file)))?;
+    let header = reader.header();
+    let promised = header.number_of_points();
+    let format = header.point_format();
+    // What compression saves is not known, and the promise then not believed.
+    let at_most =
+        length.filter(|_| !format.is_compressed).map(|bytes| bytes / u64::from(format.len()).max(1));
+    let scales = [header.transforms().x, header.transforms().y, header.transforms().z];
+    if let Some(scale) = scales.iter().map(|t| t.scale).find(|scale| !(scale.is_finite() && *scale > 0.0)) {
+        return Err(DataError::new(format!("the header's scale of a coordinate is {scale}")));
+    }
+    sink.expect(promised, at_most)?;
+    let mut piece = PointDataBuilder::new().for_header(reader.header()).build();
+    let mut found = 0;
+    while found < promised {
+        let count = (promised - found).min(PIECE_POINTS);
+        let got = checked(&format!("after {found} of {promised} points"), || {
+            reader.fill_points(count, &mut piece)
+        })?;
+        if got == 0 {
+            return Err(DataError::new(format!("the file ends after {found} of {promised} points")));
+        }
+        for ((x, y), z) in piece.x().zip(piece.y()).zip(piece.z()) {
+            sink.double([x, y, z])?;
+        }
+        found += got;
+    }
+    Ok(())
+}
+
+/// What the decoder makes; bytes that are none of a compressed file may bring it to stop in its own code.
+fn checked<T>(place: &str, decode: impl FnOnce() -> las::Result<T>) -> DataResult<T> {
+    match catch_unwind(AssertUnwindSafe(decode)) {
+        Ok(Ok(made)) => Ok(made),
+        Ok(Err(error)) => {
+            Err(DataError::new(format!("the LAS or LAZ file cannot be read: {place}")).because(error))
+        }
+        Err(_) => Err(DataError::new(format!("the LAS or LAZ file cannot be decoded: {place}"))
+            .hint("its bytes are damaged; copy it again, or repack it with laszip")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use las::{Builder, Point, Transform, Vector, Writer};
+
+    use super::*;
+    use crate::cloud::{CloudOptions, read_scan_points};
+
+    /// A file of points that a map has, written by the crate itself.
+    fn file(name: &str, points: usize) -> (tempfile::TempDir, std::path::PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        let mut builder = Builder::from((1, 4));
+        builder.point_format.is_compressed = name.ends_with("laz");
+        let axis = |offset| Transform { scale: 0.001, offset };
+        builder.transforms = Vector { x: axis(461_000.0), y: axis(5_428_000.0), z: axis(300.0) };
+        let mut writer = Writer::from_path(&path, builder.into_header().unwrap()).unwrap();
+        for i in 0..points {
+            let t = i as f64;
+            let (x, y, z) = (461_234.0 + 0.001 * t, 5_428_765.5 - 0.002 * t, 312.0 + (t % 7.0));
+            writer.write_point(Point { x, y, z, ..Default::default() }).unwrap();
+        }
+        writer.close().unwrap();
+        (folder, path)
+    }
+
+    #[test]
+    fn coordinates_of_a_map_keep_their_millimetres() {
+        for name in ["scan.las", "scan.laz"] {
+            let (_folder, path) = file(name, 100_000);
+            let scan = read_scan_points(&path, &CloudOptions::default()).unwrap();
+            assert_eq!(scan.points.len(), 100_000, "{name}");
+            let [x, y, z] = std::array::from_fn(|i| scan.origin_m[i] + f64::from(scan.points[99_999][i]));
+            assert!((x - 461_333.999).abs() < 1e-4 && (y - 5_428_565.502).abs() < 1e-4, "{name}: {x} {y}");
+            assert!((z - 316.0).abs() < 1e-6, "{name}: {z}");
+            assert!(scan.suspicions.is_empty(), "{name}");
+        }
+    }
+
+    #[test]
+    fn damaged_files_are_an_error_and_no_more() {
+        for name in ["scan.las", "scan.laz"] {
+            let (_folder, path) = file(name, 5000);
+            let whole = std::fs::read(&path).unwrap();
+            for cut in [4, 100, 300, whole.len() / 2, whole.len() - 20] {
+                std::fs::write(&path, &whole[..cut]).unwrap();
+                let error = read_scan_points(&path, &CloudOptions::default()).map(|s| s.points.len());
+                assert!(error.is_err(), "{name} cut to {cut}: {error:?}");
+            }
+            for place in (0..whole.len()).step_by(whole.len() / 60) {
+                let mut damaged = whole.clone();
+                damaged[place] ^= 0xff;
+                std::fs::write(&path, &damaged).unwrap();
+                // An error or other points, but an answer.
+                let _ =
+                    read_scan_points(&path, &CloudOptions { max_bytes: Some(1 << 26), ..Default::default() });
+            }
+        }
+    }
+}
