@@ -16,6 +16,7 @@
 //! | [`paths`] | names from files, kept below their folder |
 //! | [`address`], [`elsewhere`] | data that is named by a URL, and files that are read by ranges |
 //! | [`atomic`] | writing all or nothing |
+//! | [`leftovers`] | temporary files, for a program that is asked to end |
 #![forbid(unsafe_code)]
 
 pub mod address;
@@ -27,6 +28,7 @@ pub mod heading;
 pub mod image_file;
 pub mod imu_file;
 pub mod labels;
+pub mod leftovers;
 pub mod leniency;
 pub mod not_text;
 pub mod paths;

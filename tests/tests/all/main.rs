@@ -5,6 +5,7 @@
 
 mod annotate;
 mod annotate_detect;
+mod annotate_hostile;
 mod annotate_kill;
 mod annotate_reach;
 mod annotator;
@@ -24,6 +25,7 @@ mod euroc_oracle;
 mod evaluate_oracle;
 mod fleet;
 mod fleet_cluster;
+mod interrupted;
 mod labels_track;
 mod locobot_oracle;
 mod plugin_check;

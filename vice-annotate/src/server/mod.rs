@@ -1,9 +1,10 @@
-//! The annotator for a browser: a server on this machine, for whoever has the token in its address.
+//! The annotator for a browser: a server on this machine, for whoever was let in by one of its addresses.
 //!
 //! Frames are asked for by index, never by name. Every change is on the disk before it is answered.
 
 mod api;
 mod assets;
+mod connections;
 mod error;
 mod events;
 mod frames;
@@ -16,7 +17,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use axum::Router;
-use axum::extract::{DefaultBodyLimit, Path, State};
+use axum::extract::{DefaultBodyLimit, Path};
 use axum::http::StatusCode;
 use axum::middleware;
 use axum::response::{IntoResponse, Response};
@@ -31,6 +32,8 @@ use error::ApiError;
 use events::Hub;
 use frames::Frames;
 use guard::Guard;
+
+pub use guard::Invitations;
 
 /// Bytes of a request, but for imports.
 const MAX_BODY: usize = 1 << 20;
@@ -65,12 +68,16 @@ struct App {
     guard: Arc<Guard>,
 }
 
-/// Serves until the program is asked to stop (Ctrl-C, or SIGTERM), then writes the labels file. `ready` gets the page's
-/// address, which holds the token.
+/// Serves until the program is asked to stop (Ctrl-C, or SIGTERM), then writes the labels file. `ready` gets what makes
+/// addresses that let a browser in.
 ///
 /// # Errors
 /// [`DataError`] if the address cannot be used, or at the end if the labels file cannot be written.
-pub fn serve(desk: Desk, options: &ServerOptions, ready: impl FnOnce(&str)) -> DataResult<()> {
+pub fn serve(
+    desk: Desk,
+    options: &ServerOptions,
+    ready: impl FnOnce(&Invitations) -> DataResult<()>,
+) -> DataResult<()> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
@@ -81,7 +88,11 @@ pub fn serve(desk: Desk, options: &ServerOptions, ready: impl FnOnce(&str)) -> D
     outcome
 }
 
-async fn run(desk: Desk, options: &ServerOptions, ready: impl FnOnce(&str)) -> DataResult<()> {
+async fn run(
+    desk: Desk,
+    options: &ServerOptions,
+    ready: impl FnOnce(&Invitations) -> DataResult<()>,
+) -> DataResult<()> {
     let wanted = SocketAddr::new(options.bind, options.port);
     let failed = |e: std::io::Error| {
         let error = DataError::new(format!("cannot listen on {wanted}"));
@@ -97,15 +108,6 @@ async fn run(desk: Desk, options: &ServerOptions, ready: impl FnOnce(&str)) -> D
     let mut stop = StopSignal::new()?;
     let listener = TcpListener::bind(wanted).await.map_err(failed)?;
     let address = listener.local_addr().map_err(failed)?;
-    let token = guard::new_token()?;
-    let shown = match address.ip() {
-        ip if ip.is_unspecified() => SocketAddr::new(
-            if ip.is_ipv4() { [127, 0, 0, 1].into() } else { std::net::Ipv6Addr::LOCALHOST.into() },
-            address.port(),
-        ),
-        _ => address,
-    };
-    let url = format!("http://{shown}/?token={token}");
     let size = (desk.camera.width(), desk.camera.height());
     let app = Arc::new(App {
         jobs: Jobs::default(),
@@ -115,26 +117,28 @@ async fn run(desk: Desk, options: &ServerOptions, ready: impl FnOnce(&str)) -> D
         keys: options.keys.clone(),
         projections: Mutex::default(),
         closing: watch::Sender::new(false),
-        guard: Arc::new(Guard { token, address }),
+        guard: Arc::new(Guard::new(address)?),
         desk,
     });
-    ready(&url);
-    let (closing, mut closed) = (app.closing.clone(), app.closing.subscribe());
-    let served = axum::serve(listener, router(&app)).with_graceful_shutdown(async move {
+    ready(&Invitations::new(&app.guard))?;
+    let mut closed = app.closing.subscribe();
+    let stopped = async {
         stop.wait().await;
-        closing.send_replace(true);
-    });
-    let result = tokio::select! {
-        result = served.into_future() => result,
-        () = async {
-            // Fails only if the sender is gone, and it is in `app`.
-            let _ = closed.wait_for(|closing| *closing).await;
-            tokio::time::sleep(GRACE).await;
-        } => Ok(()),
+        app.closing.send_replace(true);
+        std::future::pending::<()>().await;
     };
+    let over = async {
+        // Fails only if the sender is gone, and it is in `app`.
+        let _ = closed.wait_for(|closing| *closing).await;
+        tokio::time::sleep(GRACE).await;
+    };
+    tokio::select! {
+        () = connections::serve(listener, router(&app), app.closing.subscribe()) => {}
+        () = over => {}
+        () = stopped => {}
+    }
     app.jobs.stop_all();
-    finish(app).await?;
-    result.map_err(|e| DataError::new("the server ended").because(e))
+    finish(app).await
 }
 
 /// Waits for the jobs to let go of the labels, and saves them.
@@ -158,6 +162,7 @@ async fn finish(app: Arc<App>) -> DataResult<()> {
 
 fn router(app: &Arc<App>) -> Router {
     Router::new()
+        .route(guard::ENTRANCE, get(guard::enter).with_state(Arc::clone(&app.guard)))
         .route("/", get(page))
         .route("/{file}", get(file))
         .route("/api/state", get(api::state))
@@ -182,16 +187,16 @@ fn router(app: &Arc<App>) -> Router {
         .with_state(Arc::clone(app))
 }
 
-async fn page(State(app): State<Arc<App>>) -> Result<Response, ApiError> {
-    asset(&app, "")
+async fn page() -> Result<Response, ApiError> {
+    asset("")
 }
 
-async fn file(State(app): State<Arc<App>>, Path(name): Path<String>) -> Result<Response, ApiError> {
-    asset(&app, &name)
+async fn file(Path(name): Path<String>) -> Result<Response, ApiError> {
+    asset(&name)
 }
 
-fn asset(app: &App, name: &str) -> Result<Response, ApiError> {
-    assets::asset(name, &app.guard.token)
+fn asset(name: &str) -> Result<Response, ApiError> {
+    assets::asset(name)
         .map(IntoResponse::into_response)
         .ok_or_else(|| ApiError::new(StatusCode::NOT_FOUND, "there is nothing here"))
 }

@@ -8,12 +8,15 @@
 //! | journal | every change on the disk before it is acknowledged |
 //! | [`Store`] | all of them together, and the labels file, which is written beside and renamed |
 
+mod claim;
 mod document;
 mod edit;
 mod history;
 mod journal;
 mod open;
+mod replay;
 mod save;
+mod utc;
 
 use std::path::{Path, PathBuf};
 
@@ -78,6 +81,8 @@ pub struct Store {
     settled: u64,
     last_job: u64,
     journal: Option<Journal>,
+    /// The labels file, locked; `None` where there is none yet.
+    claim: Option<std::fs::File>,
     read_only: Option<String>,
     /// The labels file as it was last read or written.
     file: Option<FileMark>,
