@@ -393,15 +393,23 @@ test("a second program on the same file may only look", async () => {
   await other.end();
 });
 
-test("without the right token there is nothing", async () => {
-  for (const url of [server.origin, `${server.origin}/?token=wrong`, `${server.origin}/main.js`, `${server.origin}/api/state?token=wrong`]) {
+test("an address lets one browser in, once, and its token is gone from the address bar", async () => {
+  for (const url of [server.origin, server.url, `${server.origin}/open?token=wrong`, `${server.origin}/main.js`, `${server.origin}/api/state`]) {
     assert.equal((await fetch(url)).status, 401, url);
   }
+  const other = await Server.start(dataset, join(scratch(), "door.json"), [], false);
   const page = await (await chromium.newContext()).newPage();
-  const answer = await page.goto(`${server.origin}/?token=wrong`);
-  assert.equal(answer?.status(), 401);
-  assert.equal(await page.locator("canvas").count(), 0);
+  await page.goto(other.url);
+  await page.waitForURL(`${other.origin}/`);
+  await page.locator("canvas").first().waitFor();
+  const cookies = await page.context().cookies();
+  assert.ok(cookies.every((c) => c.httpOnly && c.sameSite === "Strict"), JSON.stringify(cookies));
+  const second = await (await chromium.newContext()).newPage();
+  assert.equal((await second.goto(other.url))?.status(), 401);
+  assert.equal(await second.locator("canvas").count(), 0);
+  await second.context().close();
   await page.context().close();
+  await other.end();
 });
 
 test("killed and started again it has every label, and says when it is gone", async () => {

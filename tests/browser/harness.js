@@ -142,22 +142,30 @@ export function truth(folder) {
 export class Server {
   /**
    * @param {ChildProcess} child
-   * @param {string} url with the token
+   * @param {string} url which opens the page once
    */
   constructor(child, url) {
     this.child = child;
     this.url = url;
     this.origin = new URL(url).origin;
-    this.token = new URL(url).searchParams.get("token") ?? "";
+    this.cookie = "";
+  }
+
+  /** Uses the address up, as a browser does. */
+  async enter() {
+    const answer = await fetch(this.url);
+    if (answer.status !== 200) throw new Error(`${this.url}: ${answer.status}`);
+    this.cookie = (answer.headers.get("set-cookie") ?? "").split(";")[0] ?? "";
   }
 
   /**
    * @param {string} dataset
    * @param {string} labels the file, in a folder that is there
    * @param {string[]} [more] arguments
+   * @param {boolean} [enter] whether its address is used up
    * @returns {Promise<Server>}
    */
-  static async start(dataset, labels, more = []) {
+  static async start(dataset, labels, more = [], enter = true) {
     const child = spawn(program(), ["annotate", dataset, "--labels", basename(labels), "--no-open", "--port", "0", ...more], {
       cwd: dirname(labels),
       stdio: ["ignore", "pipe", "pipe"],
@@ -180,6 +188,7 @@ export class Server {
     });
     const server = new Server(child, url);
     children.add(child);
+    if (enter) await server.enter();
     return server;
   }
 
@@ -199,7 +208,7 @@ export class Server {
    * @param {RequestInit} [init]
    */
   request(path, init = {}) {
-    return fetch(this.origin + path, { ...init, headers: { Authorization: `Bearer ${this.token}`, "Content-Type": "application/json", ...init.headers } });
+    return fetch(this.origin + path, { ...init, headers: { Cookie: this.cookie, "Content-Type": "application/json", ...init.headers } });
   }
 
   /** @returns {Promise<State>} */
@@ -268,7 +277,9 @@ export class Window {
 
   /** @param {Server} server */
   async goto(server) {
-    await this.page.goto(server.url);
+    const [name = "", value = ""] = server.cookie.split("=");
+    await this.page.context().addCookies([{ name, value, url: server.origin, httpOnly: true, sameSite: "Strict" }]);
+    await this.page.goto(server.origin);
     await this.shows(0);
     await this.page.waitForFunction(() => document.activeElement?.id === "marks");
   }

@@ -5,7 +5,7 @@ import { afterEach, beforeEach, test } from "node:test";
 
 /** @import {Observation, State} from "../../vice-annotate/page/types.js" */
 
-Object.assign(globalThis, { location: { search: "?token=secret" } });
+Object.assign(globalThis, { location: { search: "" } });
 const { View } = await import("../../vice-annotate/page/view.js");
 const { Labels } = await import("../../vice-annotate/page/labels.js");
 const { coverage, coverageText } = await import("../../vice-annotate/page/coverage.js");

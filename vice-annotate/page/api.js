@@ -1,8 +1,6 @@
-// The server, as functions. Every request carries the token that stands in the page's address.
+// The server, as functions. The browser shows the cookie that it was let in with.
 
 /** @import {Change, Direction, Edit, Empty, Job, Pixel, Projections, ReviewState, State, Suggestions, Summary, Targets, Verdict} from "./types.js" */
-
-const token = new URLSearchParams(location.search).get("token") ?? "";
 
 /** An answer that is no success: one clear line, and perhaps what to do. */
 export class ServerError extends Error {
@@ -26,11 +24,9 @@ export class ServerError extends Error {
  * @returns {Promise<Response>}
  */
 async function send(path, init = {}) {
-  const headers = new Headers(init.headers);
-  headers.set("Authorization", `Bearer ${token}`);
   let response;
   try {
-    response = await fetch(path, { ...init, headers });
+    response = await fetch(path, init);
   } catch (cause) {
     if (cause instanceof DOMException && cause.name === "AbortError") throw cause;
     throw new ServerError(0, "the server does not answer", "is `vice annotate` still running?");
@@ -144,7 +140,7 @@ export async function stopJob(job) {
  * @returns {string} an address that downloads the labels
  */
 export function exportAddress(format) {
-  return `/api/export?format=${format}&token=${encodeURIComponent(token)}`;
+  return `/api/export?format=${format}`;
 }
 
 /**
@@ -176,7 +172,7 @@ export function postVerdict(sample, pixel) {
  *   closed: () => void, lost: () => void, open: () => void}} on
  */
 export function follow(on) {
-  const events = new EventSource(`/api/events?token=${encodeURIComponent(token)}`);
+  const events = new EventSource("/api/events");
   events.addEventListener("open", () => on.open());
   events.addEventListener("change", (event) => on.change(JSON.parse(event.data)));
   events.addEventListener("job", (event) => on.job(JSON.parse(event.data)));
@@ -188,7 +184,7 @@ export function follow(on) {
   });
   events.addEventListener("error", () => {
     on.lost();
-    // A stream that was refused (a new token after a restart) is not tried again by the browser.
+    // A stream that was refused (the cookie is of an earlier start) is not tried again by the browser.
     if (events.readyState === EventSource.CLOSED) on.closed();
   });
 }

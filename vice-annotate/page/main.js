@@ -133,7 +133,7 @@ async function open() {
 open().catch((error) => {
   const refused = error instanceof ServerError && error.status === 401;
   notices.banner("open", "error", refused
-    ? "This address lacks the token, or has an old one. Use the address that `vice annotate` printed when it started."
+    ? "This browser was not let in, or by an earlier start. Use the address that `vice annotate` printed last; each opens the page once."
     : `The labels cannot be opened: ${error.message}${error.hint ? ` — ${error.hint}` : ""}`);
   setText(byId("saved", HTMLElement), "Not open");
   if (!(error instanceof ServerError)) throw error;

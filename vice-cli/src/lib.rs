@@ -5,6 +5,7 @@
 
 mod arguments;
 mod commands;
+mod doorway;
 mod inputs;
 mod itself;
 mod outputs;
@@ -37,6 +38,10 @@ pub fn main_from(args: impl IntoIterator<Item = OsString>, itself: Itself) -> u8
     };
     let verbosity = terminal::Verbosity::new(cli.quiet, cli.verbose);
     terminal::show_warnings(verbosity);
+    // The annotator ends by itself, with all labels saved.
+    if !matches!(cli.command, Command::Annotate(_)) {
+        signals::listen();
+    }
     let outcome = match &cli.command {
         Command::Annotate(args) => commands::annotate::run(args, verbosity),
         Command::Calibration(command) => commands::calibration::run(command),

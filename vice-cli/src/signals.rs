@@ -1,46 +1,67 @@
-//! Being asked to stop: once to end cleanly, twice to end at once.
+//! Being asked to stop: at once without leaving anything half written, or, for a batch, once to end cleanly and twice to
+//! end at once.
 
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+use vice_files::leftovers;
 
 use crate::terminal::Verbosity;
 
 /// The exit code after it, as of a program that Ctrl-C ended.
 pub(crate) const INTERRUPTED: u8 = 130;
 
-/// Sets a flag at the first Ctrl-C or SIGTERM; the second ends the program.
-pub(crate) fn stop_at_first(stop: &'static AtomicBool, verbosity: Verbosity) -> anyhow::Result<()> {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_io().build()?;
-    std::thread::spawn(move || {
-        let heard = runtime.block_on(async {
-            let mut asked = Asked::new()?;
-            asked.wait().await;
-            stop.store(true, Ordering::SeqCst);
-            verbosity.note("stopping when the runs in flight have ended; once more stops at once");
-            asked.wait().await;
-            std::io::Result::Ok(())
+/// The flag that the first signal sets, for commands that end by themselves then.
+static GENTLE: OnceLock<(&'static AtomicBool, Verbosity)> = OnceLock::new();
+
+/// Listens to Ctrl-C, SIGTERM and SIGHUP from here on: temporary files go, then the program ends.
+///
+/// Where the system gives no thread for it a signal ends the program as ever, and what is half written is left.
+pub(crate) fn listen() {
+    let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_io().build() else { return };
+    let listening = std::thread::Builder::new().name("signals".to_string()).spawn(move || {
+        runtime.block_on(async {
+            let Ok(mut asked) = Asked::new() else { return };
+            let mut code = asked.wait().await;
+            if let Some((stop, verbosity)) = GENTLE.get() {
+                stop.store(true, Ordering::SeqCst);
+                verbosity.note("stopping when the runs in flight have ended; once more stops at once");
+                code = asked.wait().await;
+            }
+            leftovers::remove_all();
+            std::process::exit(code);
         });
-        if heard.is_ok() {
-            std::process::exit(i32::from(INTERRUPTED));
-        }
     });
-    Ok(())
+    drop(listening);
+}
+
+/// Has the first signal set a flag; only the second ends the program.
+pub(crate) fn stop_at_first(stop: &'static AtomicBool, verbosity: Verbosity) {
+    // A command asks for it once.
+    let _ = GENTLE.set((stop, verbosity));
 }
 
 #[cfg(unix)]
-struct Asked([tokio::signal::unix::Signal; 2]);
+struct Asked([tokio::signal::unix::Signal; 3]);
 
 #[cfg(unix)]
 impl Asked {
     fn new() -> std::io::Result<Self> {
         use tokio::signal::unix::{SignalKind, signal};
-        Ok(Self([signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?]))
+        Ok(Self([
+            signal(SignalKind::interrupt())?,
+            signal(SignalKind::terminate())?,
+            signal(SignalKind::hangup())?,
+        ]))
     }
 
-    async fn wait(&mut self) {
-        let [a, b] = &mut self.0;
+    /// The exit code that a shell gives a program which the signal ended.
+    async fn wait(&mut self) -> i32 {
+        let [interrupt, terminate, hangup] = &mut self.0;
         tokio::select! {
-            _ = a.recv() => {}
-            _ = b.recv() => {}
+            _ = interrupt.recv() => 130,
+            _ = terminate.recv() => 143,
+            _ = hangup.recv() => 129,
         }
     }
 }
@@ -54,9 +75,10 @@ impl Asked {
         Ok(Self)
     }
 
-    async fn wait(&mut self) {
+    async fn wait(&mut self) -> i32 {
         if tokio::signal::ctrl_c().await.is_err() {
             std::future::pending::<()>().await;
         }
+        i32::from(INTERRUPTED)
     }
 }

@@ -10,7 +10,7 @@ pub fn printable(text: &str) -> String {
 }
 
 /// Bytes as two digits each, such as those of a hash.
-pub(crate) fn hex(bytes: &[u8]) -> String {
+pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 

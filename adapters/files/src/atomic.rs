@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 
 use vice_core::error::{DataError, DataResult};
 
+use crate::leftovers;
+
 /// What to do with a file that is there already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overwrite {
@@ -74,6 +76,7 @@ where
             .into());
     }
     let temporary = new_file_beside(&folder).map_err(failed)?;
+    let _there = leftovers::note(temporary.path());
     let mut writer = BufWriter::with_capacity(1 << 16, temporary);
     let value = fill(&mut writer)?;
     let temporary = writer.into_inner().map_err(|e| failed(e.into_error()))?;

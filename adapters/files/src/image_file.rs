@@ -7,7 +7,9 @@ use std::path::Path;
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::imageops::FilterType as Resampling;
-use image::{DynamicImage, ExtendedColorType, GrayImage, ImageEncoder, ImageReader, Limits, RgbImage};
+use image::{
+    DynamicImage, ExtendedColorType, GrayImage, ImageDecoder, ImageEncoder, ImageReader, Limits, RgbImage,
+};
 use vice_core::dataset::{DepthImage, Image, PixelFormat};
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::time::Stamp;
@@ -16,8 +18,12 @@ use crate::elsewhere;
 
 /// Columns or rows beyond which a picture is refused.
 pub const MAX_SIDE_PX: u32 = 32_768;
-/// Bytes beyond which the decoder stops.
+/// Bytes of pixels beyond which the decoder stops.
 const MAX_DECODED_BYTES: u64 = 1 << 30;
+/// Bytes of pixels that any file may claim, however small it is: 32 million coloured pixels.
+const FREE_DECODED_BYTES: u64 = 96 << 20;
+/// Bytes of pixels for each byte of a larger file. Pictures of a camera are packed 2 to 30 times; only a bomb needs more.
+const MAX_PACKING: u64 = 64;
 
 /// Decodes a PNG or JPEG: gray stays gray, 16 bits a channel become 8 (the full range scaled), alpha is dropped.
 ///
@@ -187,7 +193,19 @@ fn decode_dynamic(bytes: &[u8]) -> DataResult<DynamicImage> {
     limits.max_image_height = Some(MAX_SIDE_PX);
     limits.max_alloc = Some(MAX_DECODED_BYTES);
     reader.limits(limits);
-    reader.decode().map_err(not_an_image)
+    let decoder = reader.into_decoder().map_err(not_an_image)?;
+    let claimed = decoder.total_bytes();
+    if claimed > FREE_DECODED_BYTES.max(MAX_PACKING.saturating_mul(bytes.len() as u64)).min(MAX_DECODED_BYTES)
+    {
+        let (width, height) = decoder.dimensions();
+        return Err(DataError::new(format!(
+            "claims {width}x{height} pixels ({} MB) in {} kB: no camera's picture is packed like that, it is not decoded",
+            claimed >> 20,
+            bytes.len() >> 10
+        ))
+        .hint("is the file damaged?"));
+    }
+    DynamicImage::from_decoder(decoder).map_err(not_an_image)
 }
 
 fn check_scale(metres_per_count: f64) -> DataResult<()> {
@@ -268,6 +286,19 @@ mod tests {
         let crc = crc32(&huge[12..29]);
         huge[29..33].copy_from_slice(&crc.to_be_bytes());
         assert!(decode(&huge).is_err());
+    }
+
+    #[test]
+    fn a_bomb_is_seen_by_its_header() {
+        // All black: a thousandth of its pixels, as packed as a PNG can be.
+        let black = Image::new(12_000, 9_000, PixelFormat::Gray8, vec![0; 108_000_000]).unwrap();
+        let png = encode_png(&black).unwrap();
+        let begun = std::time::Instant::now();
+        let error = decode(&png).unwrap_err().to_string();
+        assert!(error.contains("12000x9000 pixels") && error.contains("not decoded"), "{error}");
+        assert!(begun.elapsed().as_millis() < 500);
+        let fair = Image::new(4_000, 3_000, PixelFormat::Gray8, vec![0; 12_000_000]).unwrap();
+        assert!(decode(&encode_png(&fair).unwrap()).is_ok(), "a black frame of a large camera");
     }
 
     fn crc32(bytes: &[u8]) -> u32 {

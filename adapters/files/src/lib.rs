@@ -18,6 +18,7 @@
 //! | [`address`], [`elsewhere`] | data that is named by a URL, and files that are read by ranges |
 //! | [`vice_toml`] | what a user says of a data set once for all |
 //! | [`atomic`] | writing all or nothing |
+//! | [`leftovers`] | temporary files, for a program that is asked to end |
 #![forbid(unsafe_code)]
 
 pub mod address;
@@ -29,6 +30,7 @@ pub mod heading;
 pub mod image_file;
 pub mod imu_file;
 pub mod labels;
+pub mod leftovers;
 pub mod leniency;
 pub mod not_text;
 pub mod once;

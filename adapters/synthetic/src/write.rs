@@ -5,6 +5,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 
 use nalgebra::UnitQuaternion;
 use rayon::prelude::*;
@@ -17,11 +18,17 @@ use vice_files::atomic::{self, Overwrite};
 use vice_files::calibration::{CalibrationFile, CameraOverride};
 use vice_files::image_file::{encode_depth_png, encode_png};
 use vice_files::labels;
+use vice_files::leftovers;
 use vice_files::trajectory::{InertialRow, write_euroc as write_ground_truth, write_relative, write_tum};
 
 use crate::dataset::{CAMERA, Synthetic};
 use crate::estimates::relative_motions;
 use crate::sensors;
+
+/// What the name of a folder starts with that is still being filled.
+const STAGED: &str = ".vice-synth-";
+/// Age beyond which such a folder is nobody's any more.
+const ABANDONED: Duration = Duration::from_secs(24 * 3600);
 
 /// Depth PNGs hold counts of this many metres: 0.2 mm, up to 13.1 m.
 pub const METRES_PER_COUNT: f64 = 0.0002;
@@ -52,7 +59,7 @@ pub fn write_euroc(
     };
     fs::create_dir_all(parent).map_err(failed)?;
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".vice-synth-");
+    builder.prefix(STAGED);
     // A temporary folder is private by default; this one becomes an ordinary folder, so the umask decides.
     #[cfg(unix)]
     let builder = {
@@ -60,7 +67,9 @@ pub fn write_euroc(
         builder.permissions(fs::Permissions::from_mode(0o777))
     };
     // Removes itself on every error.
+    leftovers::remove_abandoned(parent, STAGED, "", ABANDONED);
     let staged = builder.tempdir_in(parent).map_err(failed)?;
+    let _there = leftovers::note(staged.path());
     Folder { root: staged.path().to_path_buf(), overwrite: Overwrite::Refuse }
         .fill(synthetic, progress)
         .map_err(|e| DataError::new("the flight cannot be written").at(out).because(e))?;

@@ -14,6 +14,11 @@ use vice_files::elsewhere::{self, Reader};
 /// Bytes of `moov` beyond which a film is refused; a day at 120 frames a second needs about 200 MB.
 const MAX_INDEX_BYTES: u64 = 512 << 20;
 
+/// Frames beyond which a film is refused: a day at 120 frames a second has fewer.
+const MAX_FRAMES: u64 = 12_000_000;
+/// Pixels that a byte of a frame can stand for where all frames have one size: such films are not compressed, or little.
+const MAX_PIXELS_PER_BYTE: u64 = 256;
+
 /// A frame at which decoding may start, in ticks of the track's clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct SyncFrame {
@@ -156,6 +161,18 @@ fn parse_index(moov: &[u8], file_length: u64) -> DataResult<MovIndex> {
     let room = if each == 0 { (stsz.len() - 12) as u64 / 4 } else { file_length / u64::from(each) };
     if count as u64 > room {
         return Err(DataError::new(format!("its index promises {count} frames, there is room for {room}")));
+    }
+    // Empty room is cheap: a file may be sparse. So what is promised must be a film that somebody could have taken.
+    if count as u64 > MAX_FRAMES {
+        return Err(DataError::new(format!(
+            "its index promises {count} frames; more than {MAX_FRAMES} are not read"
+        ))
+        .hint("cut the film into parts"));
+    }
+    if each != 0 && u64::from(each) * MAX_PIXELS_PER_BYTE < u64::from(width) * u64::from(height) {
+        return Err(DataError::new(format!(
+            "its index says that each frame has {each} bytes: too few for {width}x{height} pixels"
+        )));
     }
     let stbl = |name| find(track, &[b"mdia", b"minf", b"stbl", name]);
     let decoded = decode_times(need(&[b"mdia", b"minf", b"stbl", b"stts"])?, count)?;

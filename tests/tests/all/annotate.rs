@@ -152,17 +152,23 @@ fn edits_are_made_undone_and_saved() {
 }
 
 #[test]
-fn only_the_holder_of_the_token_may_ask_and_only_from_here() {
+fn only_a_browser_that_was_let_in_may_ask_and_only_from_here() {
     let run = Run::new();
     let annotator = run.open();
     let host = annotator.host();
     let ask = |path: &str, headers: &str| annotator.raw(&format!("GET {path} HTTP/1.1\r\n{headers}"), "");
-    let token = annotator.token();
+    let cookie = annotator.cookie();
+    let token = annotator.entrance().rsplit_once("token=").unwrap().1;
     for path in ["/", "/main.js", "/api/state", "/api/frames/0", "/api/events", "/api/none"] {
-        bad(&ask(path, &format!("Host: {host}\r\n")), 401, "token");
-        bad(&ask(&format!("{path}?token={token}0"), &format!("Host: {host}\r\n")), 401, "token");
+        bad(&ask(path, &format!("Host: {host}\r\n")), 401, "let in");
+        bad(&ask(path, &format!("Host: {host}\r\nCookie: {cookie}0\r\n")), 401, "let in");
+        bad(&ask(&format!("{path}?token={token}"), &format!("Host: {host}\r\n")), 401, "let in");
     }
-    let known = format!("Authorization: Bearer {token}\r\n");
+    for used in [annotator.entrance(), "/open?token=", "/open"] {
+        bad(&ask(used, &format!("Host: {host}\r\n")), 401, "used already");
+    }
+    bad(&ask(annotator.entrance(), "Host: evil.example\r\n"), 421, "name");
+    let known = format!("Cookie: other=1; {cookie}\r\n");
     let port = host.rsplit_once(':').unwrap().1;
     for other in ["evil.example", &format!("evil.example:{port}"), "127.0.0.1:1", "127.0.0.1"] {
         bad(&ask("/api/state", &format!("Host: {other}\r\n{known}")), 421, "name");
@@ -184,7 +190,7 @@ fn only_the_holder_of_the_token_may_ask_and_only_from_here() {
         200
     );
     let page = ask("/", &format!("Host: {host}\r\n{known}"));
-    assert!(page.text().contains(&format!("main.js?token={token}")), "{}", page.text());
+    assert!(page.text().contains("main.js\""), "{}", page.text());
     for header in [
         "content-security-policy: default-src 'none'",
         "referrer-policy: no-referrer",
@@ -194,10 +200,8 @@ fn only_the_holder_of_the_token_may_ask_and_only_from_here() {
         assert!(page.head.to_ascii_lowercase().contains(header), "{}", page.head);
     }
     assert!(!page.head.to_ascii_lowercase().contains("access-control"));
-    let script = ask(&format!("/main.js?token={token}"), &format!("Host: {host}\r\n"));
-    assert!(
-        script.head.contains("text/javascript") && script.text().contains(&format!(".js?token={token}\""))
-    );
+    let script = ask("/main.js", &format!("Host: {host}\r\n{known}"));
+    assert!(script.head.contains("text/javascript"), "{}", script.head);
     for path in ["/../Cargo.toml", "/package.json", "/api/frames/..%2f..%2fdata.csv", "/api/frames/-1"] {
         assert!(matches!(ask(path, &format!("Host: {host}\r\n{known}")).status, 400 | 404), "{path}");
     }

@@ -151,7 +151,7 @@ fn what_is_no_target_is_refused() {
     bad(
         &annotator.raw(&format!("POST /api/detect HTTP/1.1\r\nHost: {}\r\n", annotator.host()), "{}"),
         401,
-        "token",
+        "let in",
     );
     let second = run.open();
     bad(&second.post("/api/detect", "{\"revision\": 0, \"chessboard\": \"6x7\"}"), 403, "read-only");

@@ -33,9 +33,11 @@ fn says(run: &Run, more: &[&str], path: Option<&str>) -> (String, String) {
 fn others_are_let_in_with_a_warning_only() {
     let run = Run::new();
     let (line, warned) = says(&run, &[], None);
-    assert!(line.starts_with("http://127.0.0.1:") && line.contains("/?token="), "{line}");
+    assert!(line.starts_with("http://127.0.0.1:") && line.contains("/open?token="), "{line}");
     assert!(!warned.contains("warning"), "{warned}");
     let (line, warned) = says(&run, &["--bind", "0.0.0.0"], None);
+    assert!(line.is_empty() && warned.contains("--insecure"), "{line} {warned}");
+    let (line, warned) = says(&run, &["--bind", "0.0.0.0", "--insecure"], None);
     assert!(line.starts_with("http://127.0.0.1:"), "{line}");
     assert!(warned.contains("--bind 0.0.0.0") && warned.contains("nothing is encrypted"), "{warned}");
 }

@@ -32,6 +32,7 @@ pub(crate) struct Annotator {
     child: Child,
     _stdout: BufReader<ChildStdout>,
     address: String,
+    cookie: String,
 }
 
 impl Drop for Annotator {
@@ -58,15 +59,27 @@ impl Annotator {
         stdout.read_line(&mut line).unwrap();
         let address = line.trim().to_string();
         assert!(address.starts_with("http://127.0.0.1:"), "no address: `{line}`");
-        Self { child, _stdout: stdout, address }
+        let mut started = Self { child, _stdout: stdout, address, cookie: String::new() };
+        let entrance = started.address[started.address.rfind("/open").unwrap()..].to_string();
+        let answer = started.raw(&format!("GET {entrance} HTTP/1.1\r\nHost: {}\r\n", started.host()), "");
+        assert_eq!(answer.status, 200, "{}", answer.text());
+        let cookie = answer.head.lines().find_map(|l| l.strip_prefix("set-cookie: ")).unwrap();
+        started.cookie = cookie.split(';').next().unwrap().to_string();
+        started
     }
 
     pub(crate) fn host(&self) -> String {
         self.address.trim_start_matches("http://").split('/').next().unwrap().to_string()
     }
 
-    pub(crate) fn token(&self) -> String {
-        self.address.rsplit_once("token=").unwrap().1.to_string()
+    /// The address that was printed, from its path on; it is used up.
+    pub(crate) fn entrance(&self) -> &str {
+        &self.address[self.address.rfind("/open").unwrap()..]
+    }
+
+    /// Name and value.
+    pub(crate) fn cookie(&self) -> &str {
+        &self.cookie
     }
 
     /// Sends a head (without the blank line) and a body, and reads until the server closes.
@@ -79,9 +92,9 @@ impl Annotator {
     }
 
     fn head(&self, method: &str, path: &str) -> String {
-        let (host, token) = (self.host(), self.token());
+        let (host, cookie) = (self.host(), &self.cookie);
         format!(
-            "{method} {path} HTTP/1.1\r\nHost: {host}\r\nAuthorization: Bearer {token}\r\nOrigin: http://{host}\r\n\
+            "{method} {path} HTTP/1.1\r\nHost: {host}\r\nCookie: {cookie}\r\nOrigin: http://{host}\r\n\
              Content-Type: application/json\r\n"
         )
     }

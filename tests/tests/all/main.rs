@@ -6,6 +6,7 @@
 mod annotate;
 mod annotate_detect;
 mod annotate_guide;
+mod annotate_hostile;
 mod annotate_kill;
 mod annotate_reach;
 mod annotator;
@@ -27,6 +28,7 @@ mod evaluate_oracle;
 mod fleet;
 mod fleet_cluster;
 mod init;
+mod interrupted;
 mod labels_track;
 mod layouts_oracle;
 mod locobot_oracle;

@@ -1,9 +1,10 @@
-//! The annotator for a browser: a server on this machine, for whoever has the token in its address.
+//! The annotator for a browser: a server on this machine, for whoever was let in by one of its addresses.
 //!
 //! Frames are asked for by index, never by name. Every change is on the disk before it is answered.
 
 mod api;
 mod assets;
+mod connections;
 mod error;
 mod events;
 mod frames;
@@ -35,6 +36,8 @@ use error::ApiError;
 use events::Hub;
 use frames::Frames;
 use guard::Guard;
+
+pub use guard::Invitations;
 
 /// Bytes of a request, but for imports.
 const MAX_BODY: usize = 1 << 20;
@@ -72,13 +75,17 @@ struct App {
     guard: Arc<Guard>,
 }
 
-/// Serves until the program is asked to stop (Ctrl-C, or SIGTERM), then writes the labels file. `ready` gets the page's
-/// address, which holds the token.
+/// Serves until the program is asked to stop (Ctrl-C, or SIGTERM), then writes the labels file. `ready` gets what makes
+/// addresses that let a browser in.
 ///
 /// # Errors
 /// [`DataError`] if the address cannot be used, there is nothing to review where that is asked for, or at the end if the
 /// labels file cannot be written.
-pub fn serve(desk: Desk, options: &ServerOptions, ready: impl FnOnce(&str)) -> DataResult<Option<Summary>> {
+pub fn serve(
+    desk: Desk,
+    options: &ServerOptions,
+    ready: impl FnOnce(&Invitations) -> DataResult<()>,
+) -> DataResult<Option<Summary>> {
     let review = options.review.map(|count| Review::open(&desk, count)).transpose()?;
     if let Some(review) = review.as_ref().filter(|r| r.outdated() > 0) {
         let (outdated, path) = (review.outdated(), review.path().display());
@@ -100,7 +107,7 @@ async fn run(
     desk: Desk,
     review: Option<Review>,
     options: &ServerOptions,
-    ready: impl FnOnce(&str),
+    ready: impl FnOnce(&Invitations) -> DataResult<()>,
 ) -> DataResult<Option<Summary>> {
     let wanted = SocketAddr::new(options.bind, options.port);
     let failed = |e: std::io::Error| {
@@ -117,15 +124,6 @@ async fn run(
     let mut stop = StopSignal::new()?;
     let listener = TcpListener::bind(wanted).await.map_err(failed)?;
     let address = listener.local_addr().map_err(failed)?;
-    let token = guard::new_token()?;
-    let shown = match address.ip() {
-        ip if ip.is_unspecified() => SocketAddr::new(
-            if ip.is_ipv4() { [127, 0, 0, 1].into() } else { std::net::Ipv6Addr::LOCALHOST.into() },
-            address.port(),
-        ),
-        _ => address,
-    };
-    let url = format!("http://{shown}/?token={token}");
     let size = (desk.camera.width(), desk.camera.height());
     let app = Arc::new(App {
         jobs: Jobs::default(),
@@ -136,27 +134,30 @@ async fn run(
         projections: Mutex::default(),
         review: review.map(Mutex::new),
         closing: watch::Sender::new(false),
-        guard: Arc::new(Guard { token, address }),
+        guard: Arc::new(Guard::new(address)?),
         desk,
     });
-    ready(&url);
-    let (closing, mut closed) = (app.closing.clone(), app.closing.subscribe());
-    let served = axum::serve(listener, router(&app)).with_graceful_shutdown(async move {
+    ready(&Invitations::new(&app.guard))?;
+    let mut closed = app.closing.subscribe();
+    let stopped = async {
         stop.wait().await;
-        closing.send_replace(true);
-    });
-    let result = tokio::select! {
-        result = served.into_future() => result,
-        () = async {
-            // Fails only if the sender is gone, and it is in `app`.
-            let _ = closed.wait_for(|closing| *closing).await;
-            tokio::time::sleep(GRACE).await;
-        } => Ok(()),
+        app.closing.send_replace(true);
+        std::future::pending::<()>().await;
     };
+    let over = async {
+        // Fails only if the sender is gone, and it is in `app`.
+        let _ = closed.wait_for(|closing| *closing).await;
+        tokio::time::sleep(GRACE).await;
+    };
+    tokio::select! {
+        () = connections::serve(listener, router(&app), app.closing.subscribe()) => {}
+        () = over => {}
+        () = stopped => {}
+    }
     app.jobs.stop_all();
     let summary = app.review.as_ref().map(|review| lock(review).summary());
     finish(app).await?;
-    result.map(|()| summary).map_err(|e| DataError::new("the server ended").because(e))
+    Ok(summary)
 }
 
 /// Waits for the jobs to let go of the labels, and saves them.
@@ -182,6 +183,7 @@ fn router(app: &Arc<App>) -> Router {
     // Who reviews is given no label before it has been judged: what could tell them is not even served.
     let routes = if app.review.is_some() { review_routes() } else { label_routes() };
     routes
+        .route(guard::ENTRANCE, get(guard::enter).with_state(Arc::clone(&app.guard)))
         .route("/", get(page))
         .route("/{file}", get(file))
         .route("/api/frames/{frame}", get(api::frame))
@@ -216,15 +218,15 @@ fn label_routes() -> Router<Arc<App>> {
 }
 
 async fn page(State(app): State<Arc<App>>) -> Result<Response, ApiError> {
-    asset(&app, if app.review.is_some() { "review.html" } else { "" })
+    asset(if app.review.is_some() { "review.html" } else { "" })
 }
 
-async fn file(State(app): State<Arc<App>>, Path(name): Path<String>) -> Result<Response, ApiError> {
-    asset(&app, &name)
+async fn file(Path(name): Path<String>) -> Result<Response, ApiError> {
+    asset(&name)
 }
 
-fn asset(app: &App, name: &str) -> Result<Response, ApiError> {
-    assets::asset(name, &app.guard.token)
+fn asset(name: &str) -> Result<Response, ApiError> {
+    assets::asset(name)
         .map(IntoResponse::into_response)
         .ok_or_else(|| ApiError::new(StatusCode::NOT_FOUND, "there is nothing here"))
 }

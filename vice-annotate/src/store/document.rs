@@ -116,6 +116,13 @@ impl Document {
         Ok(())
     }
 
+    /// Carries out cells whatever was there before.
+    pub(super) fn put_all(&mut self, cells: &[Cell]) {
+        for cell in cells {
+            self.put(&cell.point, cell.stamp, cell.after);
+        }
+    }
+
     fn put(&mut self, point: &str, stamp: Stamp, observation: Option<Observation>) {
         match observation {
             Some(observation) => {

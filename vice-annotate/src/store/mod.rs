@@ -8,13 +8,16 @@
 //! | journal | every change on the disk before it is acknowledged |
 //! | [`Store`] | all of them together, and the labels file, which is written beside and renamed |
 
+mod claim;
 mod document;
 mod edit;
 mod history;
 mod journal;
 mod open;
+mod replay;
 mod save;
 mod segments;
+mod utc;
 
 use std::path::{Path, PathBuf};
 
@@ -79,6 +82,8 @@ pub struct Store {
     settled: u64,
     last_job: u64,
     journal: Option<Journal>,
+    /// The labels file, locked; `None` where there is none yet.
+    claim: Option<std::fs::File>,
     read_only: Option<String>,
     /// The labels file as it was last read or written.
     file: Option<FileMark>,

@@ -10,9 +10,11 @@ use vice_core::time::Stamp;
 use vice_files::image_file::read_bytes;
 use vice_files::labels::{self, LabelFormat, read_json_or_none};
 
-use super::document::{Cell, Document, inverse};
-use super::history::{History, Step};
-use super::journal::{FileMark, JOURNAL_SCHEMA, Journal, Line, Opened};
+use super::claim::{self, Claim};
+use super::document::{Cell, Document};
+use super::history::History;
+use super::journal::{FileMark, JOURNAL_SCHEMA, Journal, Line, Opened, Reading, keep_copy};
+use super::replay::{Replayed, replay, replay_behind};
 use super::{By, Store};
 
 /// Bytes of a journal beyond which it starts anew once all is saved.
@@ -38,7 +40,7 @@ impl Store {
     /// [`DataError`] if the file or its journal cannot be read, belongs to another data set or camera, may not be
     /// written, or the file was changed by another program while the journal holds changes that are not in it.
     pub fn open(labels: &Path, target: &Target<'_>) -> DataResult<Self> {
-        let (path, import) = place(labels, target.frames)?;
+        let (path, import) = place(&claim::real(labels), target.frames)?;
         check_writable(&path)?;
         let journal_path = journal_path(&path);
         let file = match read_bytes_if_there(&path)? {
@@ -63,18 +65,33 @@ impl Store {
             (None, None) => Document::default(),
         };
         let mark = file.as_ref().map(|(mark, _)| *mark);
-        let mut store = match Journal::open(&journal_path)? {
-            Opened::Taken(lines) => {
-                let mut store = match replay(&lines).map_err(|e| e.at(&journal_path))? {
+        let claim = claim::take(&path)?;
+        let mut store = match (Journal::open(&journal_path)?, claim) {
+            (Opened::Locked(journal, reading), Claim::Ours(claim)) if reading.has_gap() => {
+                let mut store = Self::recovered(path, journal, &reading, (mark, base), target)?;
+                store.claim = claim;
+                store
+            }
+            (Opened::Locked(journal, reading), Claim::Ours(claim)) => {
+                let replayed = replay(&reading.entries).map_err(|e| e.at(&journal_path))?;
+                let mut store = Self::writable(path, journal, replayed, (mark, base), target)?;
+                store.claim = claim;
+                store
+            }
+            (Opened::Taken(reading), _) => {
+                let mut store = match replay(&reading.entries).map_err(|e| e.at(&journal_path))? {
                     Some(replayed) => Self::from_replay(path, replayed, mark),
                     None => Self::fresh(path, base, mark),
                 };
                 store.read_only = Some("another vice annotate is editing this file".to_string());
                 store
             }
-            Opened::Locked(journal, lines) => {
-                let replayed = replay(&lines).map_err(|e| e.at(&journal_path))?;
-                Self::writable(path, journal, replayed, (mark, base), target)?
+            // The same file under another name (a hard link) has a journal of its own.
+            (Opened::Locked(..), Claim::Taken) => {
+                let mut store = Self::fresh(path, base, mark);
+                store.read_only =
+                    Some("another vice annotate is editing this file under another name".to_string());
+                store
             }
         };
         check_belongs(&store.document, target).map_err(|e| e.at(&store.path))?;
@@ -143,6 +160,43 @@ impl Store {
         Ok(store)
     }
 
+    /// The labels from a journal with lines missing: where the labels file was saved after those, nothing is lost but
+    /// steps of undo; else what can be read is carried out on what there is.
+    fn recovered(
+        path: PathBuf,
+        mut journal: Journal,
+        reading: &Reading,
+        (mark, base): (Option<FileMark>, Document),
+        target: &Target<'_>,
+    ) -> DataResult<Self> {
+        let shown = path.display();
+        let (document, told) = match replay_behind(&reading.entries, mark.zip(Some(&base))) {
+            Some(document) => {
+                (document, "the labels file was saved after what is missing: no label is lost".to_string())
+            }
+            None => {
+                if mark.is_some() {
+                    let kept = keep_copy(&path, &read_bytes(&path)?)
+                        .map_err(|e| DataError::new("no copy can be kept").at(&path).because(e))?;
+                    tracing::warn!("{shown}: as it was it is kept as {}", kept.display());
+                }
+                let r = Replayed::of_what_is_there(&reading.entries, base);
+                let told = match r.left_out {
+                    0 => "all entries that can be read are carried out; look over the labels".to_string(),
+                    n => format!("{n} steps of undo or redo could not be carried out; look over the labels"),
+                };
+                (r.document, told)
+            }
+        };
+        tracing::warn!("{shown}: {told}; the undo history of before is dropped");
+        check_belongs(&document, target).map_err(|e| e.at(&path))?;
+        journal.restart(&head(&document, mark))?;
+        let mut store = Self::fresh(path, document, mark);
+        store.saved = None;
+        store.journal = Some(journal);
+        Ok(store)
+    }
+
     fn fresh(path: PathBuf, document: Document, file: Option<FileMark>) -> Self {
         Self {
             path,
@@ -152,6 +206,7 @@ impl Store {
             settled: 0,
             last_job: 0,
             journal: None,
+            claim: None,
             read_only: None,
             file,
             saved: Some(0),
@@ -273,78 +328,6 @@ fn check_belongs(document: &Document, target: &Target<'_>) -> DataResult<()> {
         );
     }
     Ok(())
-}
-
-/// What a journal says.
-struct Replayed {
-    document: Document,
-    history: History,
-    revision: u64,
-    last_job: u64,
-    /// Revision that the labels file holds for certain.
-    saved: u64,
-    /// Contents that the labels file may have.
-    expected: Vec<Option<FileMark>>,
-    base_unsaved: bool,
-}
-
-impl Replayed {
-    fn is_unsaved(&self) -> bool {
-        self.revision != self.saved || self.base_unsaved
-    }
-}
-
-/// Carries out the lines of a journal; `None` where there are none.
-fn replay(lines: &[Line]) -> DataResult<Option<Replayed>> {
-    let Some(Line::Head { dataset, camera, file, base, .. }) = lines.first() else { return Ok(None) };
-    let mut document = Document::default();
-    document.dataset.clone_from(dataset);
-    document.camera.clone_from(camera);
-    let wrong = |line: usize| DataError::new("a change does not fit the ones before").line(line as u64 + 1);
-    document.apply(base).map_err(|_| wrong(0))?;
-    let mut r = Replayed {
-        document,
-        history: History::default(),
-        revision: 0,
-        last_job: 0,
-        saved: 0,
-        expected: vec![*file],
-        base_unsaved: file.is_none() && !base.is_empty(),
-    };
-    let mut saving = 0;
-    for (i, line) in lines.iter().enumerate().skip(1) {
-        match line {
-            Line::Head { .. } => return Err(wrong(i)),
-            Line::Change { label, job, cells, by: _ } => {
-                r.document.apply(cells).map_err(|_| wrong(i))?;
-                r.history.push(Step { label: label.clone(), cells: cells.clone(), job: *job });
-                r.last_job = r.last_job.max(job.unwrap_or(0));
-            }
-            Line::Undo => {
-                let cells = inverse(&r.history.to_undo().ok_or_else(|| wrong(i))?.cells);
-                r.document.apply(&cells).map_err(|_| wrong(i))?;
-                r.history.undone();
-            }
-            Line::Redo => {
-                let step = r.history.to_redo().ok_or_else(|| wrong(i))?;
-                r.document.apply(&step.cells).map_err(|_| wrong(i))?;
-                r.history.redone();
-            }
-            Line::Saving { file } => {
-                r.expected.push(Some(*file));
-                saving = r.revision;
-                continue;
-            }
-            Line::Saved => {
-                r.expected = r.expected.last().copied().into_iter().collect();
-                r.saved = saving;
-                r.base_unsaved = false;
-                continue;
-            }
-        }
-        r.revision += 1;
-    }
-    Ok(Some(r))
 }
 
 impl By {

@@ -11,6 +11,7 @@ use vice_files::image_file::read_bytes;
 use vice_files::labels::write_json;
 
 use super::Store;
+use super::claim::{self, Claim};
 use super::journal::{FileMark, Line, sync_folder_of};
 
 /// A labels file that is about to be written.
@@ -70,6 +71,11 @@ impl Store {
     pub fn end_save(&mut self, work: &SaveWork, result: DataResult<()>) {
         let noted = result.and_then(|()| {
             self.file = Some(work.mark);
+            // The file is another one now. Only names that were ours lead to it, and their journal is locked.
+            self.claim = match claim::take(&self.path)? {
+                Claim::Ours(file) => file,
+                Claim::Taken => None,
+            };
             self.saved = Some(work.revision);
             self.journal.as_mut().map_or(Ok(()), |journal| journal.append(&Line::Saved))
         });
@@ -154,6 +160,7 @@ pub(crate) fn save_now(store: &Mutex<Store>) -> DataResult<()> {
     save(store);
     let mut store = lock(store);
     store.journal = None;
+    store.claim = None;
     match store.save_problem() {
         Some(problem) => Err(DataError::new(format!("the labels file is behind the journal: {problem}"))),
         None => Ok(()),

@@ -216,6 +216,81 @@ fn what_was_done_is_there_after_reopening_with_its_history() {
     assert!(desk.open("a.json").unwrap().can_redo(), "an empty file is opened again");
 }
 
+/// Flips a bit in a line of a journal.
+fn damage(path: &std::path::Path, line: usize) {
+    let bytes = fs::read(path).unwrap();
+    let mut each: Vec<Vec<u8>> = bytes.split_inclusive(|b| *b == b'\n').map(<[u8]>::to_vec).collect();
+    let middle = each[line].len() / 2;
+    each[line][middle] ^= 1;
+    fs::write(path, each.concat()).unwrap();
+}
+
+#[test]
+fn a_damaged_journal_costs_no_label_that_the_file_or_another_line_has() {
+    let desk = Desk::new();
+    let mut store = desk.open("a.json").unwrap();
+    for frame in 0..4 {
+        desk.place(&mut store, "1", frame, frame as f64);
+    }
+    let mut store = desk.save(store);
+    drop(store);
+    store = desk.open("a.json").unwrap();
+    desk.place(&mut store, "1", 4, 4.0);
+    let whole = store.document().clone();
+    drop(store);
+    let journal = desk.path("a.json.journal");
+    let before = fs::read(&journal).unwrap();
+    // Lines: head, four places, saving, saved, a place. The file was saved behind the damage.
+    damage(&journal, 2);
+    let store = desk.open("a.json").unwrap();
+    assert_eq!(store.document(), &whole);
+    drop(desk.save(store));
+    assert!(desk.path("a.json.journal.damaged").exists() && !desk.path("a.json.damaged").exists());
+    assert_eq!(desk.open("a.json").unwrap().document(), &whole, "the journal is whole again");
+
+    // Without the file only the damaged change is missing.
+    fs::write(&journal, &before).unwrap();
+    fs::remove_file(desk.path("a.json")).unwrap();
+    damage(&journal, 3);
+    let store = desk.open("a.json").unwrap();
+    let frames: Vec<usize> =
+        store.document().point("1").unwrap().keys().map(|s| desk.frames.binary_search(s).unwrap()).collect();
+    assert_eq!(frames, [0, 1, 3, 4]);
+    assert!(desk.path("a.json.journal.damaged-2").exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn one_file_has_one_writer_whatever_it_is_called() {
+    let desk = Desk::new();
+    let mut store = desk.open("a.json").unwrap();
+    desk.place(&mut store, "1", 0, 1.0);
+    let store = desk.save(store);
+    drop(store);
+    std::os::unix::fs::symlink(desk.path("a.json"), desk.path("link.json")).unwrap();
+    fs::hard_link(desk.path("a.json"), desk.path("hard.json")).unwrap();
+    let mut store = desk.open("a.json").unwrap();
+    for name in ["link.json", "hard.json"] {
+        let other = desk.open(name).unwrap();
+        assert!(other.read_only().is_some(), "{name}");
+        assert_eq!(other.document(), store.document());
+    }
+    assert!(!desk.path("hard.json.journal").exists() && !desk.path("link.json.journal").exists());
+    // Saved, the names part: the hard link is another file from then on.
+    desk.place(&mut store, "1", 1, 2.0);
+    let work = store.begin_save().unwrap().unwrap();
+    let result = work.run();
+    store.end_save(&work, result);
+    assert!(desk.open("hard.json").unwrap().read_only().is_none());
+    assert!(desk.open("link.json").unwrap().read_only().is_some());
+    drop(store);
+    let mut through = desk.open("link.json").unwrap();
+    desk.place(&mut through, "1", 2, 3.0);
+    drop(desk.save(through));
+    assert_eq!(desk.open("a.json").unwrap().document().point("1").unwrap().len(), 3);
+    assert!(fs::symlink_metadata(desk.path("link.json")).unwrap().is_symlink());
+}
+
 #[test]
 fn looking_leaves_no_trace() {
     let desk = Desk::new();

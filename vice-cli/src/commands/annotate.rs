@@ -2,13 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::net::{IpAddr, Ipv4Addr};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::Context;
 use vice_annotate::desk::Desk;
 use vice_annotate::server::{ServerOptions, serve};
 use vice_run::request::{LabelsSpec, Request};
 
+use crate::doorway::Doorway;
 use crate::inputs::{DatasetArgs, DepthArgs, StreamArgs, WindowArgs};
 use crate::terminal::{self, Outcome, Verbosity, usage};
 
@@ -55,10 +57,13 @@ struct ServerArgs {
     /// Port to listen on; 0 takes a free one.
     #[arg(long, default_value = "0")]
     port: u16,
-    /// Address to listen on, where others shall reach the page.
+    /// Address to listen on, where others shall reach the page; needs --insecure beyond this machine.
     #[arg(long, value_name = "ADDR", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     bind: IpAddr,
-    /// Print the page's address only; do not open a browser.
+    /// Let --bind serve other machines without encryption.
+    #[arg(long)]
+    insecure: bool,
+    /// Print an address of the page only; do not open a browser.
     #[arg(long)]
     no_open: bool,
     /// Keys for actions, as JSON: {"next-frame": ["e", "pagedown"]}; the page's help lists the actions.
@@ -81,6 +86,19 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         depth,
         ..Request::default()
     };
+    if !args.server.bind.is_loopback() {
+        if !args.server.insecure {
+            return Err(usage(format!(
+                "--bind {}: others could reach the page there, and nothing is encrypted: tunnel to it instead (ssh -L \
+                 8080:localhost:PORT), or add --insecure in a network that you trust",
+                args.server.bind
+            )));
+        }
+        tracing::warn!(
+            "--bind {}: whoever listens on the way sees the images and can change the labels: nothing is encrypted",
+            args.server.bind
+        );
+    }
     let desk = Desk::open(&request)?;
     if let Some(reason) = desk.read_only().filter(|_| args.review.is_none()) {
         tracing::warn!(
@@ -88,24 +106,26 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
             desk.labels_file().display()
         );
     }
-    if !args.server.bind.is_loopback() {
-        tracing::warn!(
-            "--bind {}: whoever reaches this address and learns the token can see the images and change the labels, and \
-             nothing is encrypted",
-            args.server.bind
-        );
-    }
     let review = args.review.map(|n| n as usize);
     let options = ServerOptions { bind: args.server.bind, port: args.server.port, keys, review };
-    let summary = serve(desk, &options, |url| {
+    let folder = desk.labels_file().parent().map(Path::to_path_buf).unwrap_or_default();
+    let summary = serve(desk, &options, |invitations| {
+        let printed = invitations.url()?;
         // A closed standard output is no reason to end.
-        let _ = terminal::print(&format!("{url}\n"));
-        verbosity.note("Open this address in a browser on this machine; Ctrl-C ends.");
-        if !args.server.no_open
-            && let Err(error) = open::that_detached(url)
-        {
-            tracing::warn!("no browser could be opened ({error}): open the address above by hand");
-        }
+        let _ = terminal::print(&format!("{printed}\n"));
+        verbosity.note("This address opens the page once; the next one is printed then. Ctrl-C ends.");
+        let doorway = if args.server.no_open { None } else { Doorway::open(&folder, &invitations.url()?) };
+        let (more, state) = (invitations.clone(), Mutex::new((printed, doorway)));
+        invitations.on_use(move |used| {
+            let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+            if state.0 != used {
+                state.1 = None;
+            } else if let Ok(next) = more.url() {
+                verbosity.note(&format!("To open it in another browser: {next}"));
+                state.0 = next;
+            }
+        });
+        Ok(())
     })?;
     if let Some(summary) = summary {
         terminal::print(&format!("{}\n", summary.text()))?;

@@ -158,7 +158,7 @@ fn run_all(
     args: &RunArgs,
     verbosity: Verbosity,
 ) -> anyhow::Result<Outcome> {
-    signals::stop_at_first(&STOP, verbosity)?;
+    signals::stop_at_first(&STOP, verbosity);
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let jobs = args.jobs.map_or(cores, usize::from);
     let options = Options { jobs, shard: args.shard, retry: usize::from(args.retry), keep: args.keep()? };

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -106,7 +106,7 @@ impl Store {
             let folder = self.folder.join(name);
             fs::create_dir_all(&folder)
                 .map_err(|e| DataError::new("the folder cannot be made").at(&folder).because(e))?;
-            remove_abandoned(&folder);
+            leftovers::remove_abandoned(&folder, ".vice-", ".part", ABANDONED);
         }
         let rows = manifest.rows.iter().map(|row| ListedRow {
             run_id: row.run_id.clone(),
@@ -227,17 +227,4 @@ fn write_json(path: &Path, value: &impl Serialize) -> DataResult<()> {
         serde_json::to_writer(&mut *out, value)?;
         out.write_all(b"\n")
     })
-}
-
-/// What a killed run leaves beside its place.
-fn remove_abandoned(folder: &Path) {
-    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        let name = entry.file_name().to_string_lossy().into_owned();
-        let age = entry.metadata().and_then(|m| m.modified()).map(|t| SystemTime::now().duration_since(t));
-        let old = age.is_ok_and(|a| a.is_ok_and(|a| a > ABANDONED));
-        if name.starts_with(".vice-") && name.ends_with(".part") && old {
-            // Another batch may have been quicker; nothing is lost.
-            let _ = fs::remove_file(entry.path());
-        }
-    }
 }

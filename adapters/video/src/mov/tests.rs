@@ -121,10 +121,31 @@ fn an_index_that_promises_too_much_takes_no_memory() {
     assert!(error(&film(&many)).contains("promises 4294967295 frames, there is room for 1"));
     let same_size = Parts { stsz: vec![0, 2, u32::MAX], ..Parts::default() };
     assert!(error(&film(&same_size)).contains("promises 4294967295 frames"));
+    let tiny = Parts { stsz: vec![0, 1, 4], ..Parts::default() };
+    assert!(error(&film(&tiny)).contains("each frame has 1 bytes: too few for"), "{}", error(&film(&tiny)));
     let few_times = Parts { stts: vec![0, 1, 3, 10], ..Parts::default() };
     assert!(error(&film(&few_times)).contains("`stts` box covers 3 of 4 frames"));
     let runs = Parts { stts: vec![0, 1, u32::MAX, 10], ..Parts::default() };
     assert!(read_bytes(&film(&runs)).is_ok(), "a run beyond the last frame is only as long as the film");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_sparse_film_of_two_billion_frames_is_refused_at_once() {
+    let parts =
+        Parts { stsz: vec![0, 1, 2_000_000_000], stts: vec![0, 1, 2_000_000_000, 10], ..Parts::default() };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("film.mov");
+    std::fs::write(&path, film(&parts)).unwrap();
+    // The last box, the pictures, goes on to the end of the file.
+    let bytes = std::fs::read(&path).unwrap();
+    let sparse = [&bytes[..], &[0, 0, 0, 0], b"free"].concat();
+    std::fs::write(&path, sparse).unwrap();
+    std::fs::OpenOptions::new().write(true).open(&path).unwrap().set_len(4_000_000_000).unwrap();
+    let begun = std::time::Instant::now();
+    let error = read(&path).unwrap_err().to_string();
+    assert!(error.contains("promises 2000000000 frames; more than"), "{error}");
+    assert!(begun.elapsed().as_millis() < 500);
 }
 
 proptest! {
