@@ -116,7 +116,8 @@ test("a review shows no label before it has been judged, and keeps the distances
   const review = await Server.start(dataset, labels, [...options, "--review", "3"]);
   const page = await (await chromium.newContext({ viewport: { width: 1280, height: 720 } })).newPage();
   const blind = new Window(page);
-  await page.goto(review.url);
+  await review.admit(page);
+  await page.goto(review.origin);
   await page.locator("#asked").getByText("1 of 3. Click where the point of the key frame is.").waitFor();
   await page.waitForFunction(() => document.getElementById("image")?.dataset.frame !== "");
   const marked = () => page.evaluate(() => {

@@ -193,6 +193,15 @@ export class Server {
   }
 
   /**
+   * Shows a page the cookie that this was let in with.
+   * @param {Page} page
+   */
+  async admit(page) {
+    const [name = "", value = ""] = this.cookie.split("=");
+    await page.context().addCookies([{ name, value, url: this.origin, httpOnly: true, sameSite: "Strict" }]);
+  }
+
+  /**
    * @param {NodeJS.Signals} [signal]
    * @returns {Promise<void>} when it has ended
    */
@@ -277,8 +286,7 @@ export class Window {
 
   /** @param {Server} server */
   async goto(server) {
-    const [name = "", value = ""] = server.cookie.split("=");
-    await this.page.context().addCookies([{ name, value, url: server.origin, httpOnly: true, sameSite: "Strict" }]);
+    await server.admit(this.page);
     await this.page.goto(server.origin);
     await this.shows(0);
     await this.page.waitForFunction(() => document.activeElement?.id === "marks");

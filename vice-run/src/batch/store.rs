@@ -9,6 +9,7 @@ use sha2::{Digest, Sha256};
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_files::address::shown_path;
 use vice_files::atomic::{self, Overwrite};
+use vice_files::leftovers;
 
 use super::key::Key;
 use super::manifest::{Manifest, Row};
