@@ -109,10 +109,11 @@ pub(super) fn against_depth(
     let read = ratios(&placed, 1.0);
     let (middle, share) = (read.middle(), read.share(1.0));
     let numbers = |finding: Finding| {
-        finding
-            .number("middle-ratio", middle, "")
-            .number("share-that-agrees", share, "")
-            .number("places", read.0.len() as f64, "")
+        finding.number("middle-ratio", middle, "").number("share-that-agrees", share, "").number(
+            "places",
+            read.0.len() as f64,
+            "",
+        )
     };
     let say = |state, says: String| numbers(Finding::new(DEPTH.name, &about, state, says));
     if read.enough() && read.share(middle) >= AGREE {
@@ -129,7 +130,9 @@ pub(super) fn against_depth(
     }
     if read.enough() && share >= APART {
         let says = format!("scan and depth images agree at {:.0} % of the places only", 100.0 * share);
-        return Some(say(State::Look, says).mend("see whether the scan is of this scene, and where its frame lies"));
+        return Some(
+            say(State::Look, says).mend("see whether the scan is of this scene, and where its frame lies"),
+        );
     }
     // Units and frames that people mistake.
     let turned = placed.inverse().reinterpret::<World, CloudFrame>();
@@ -137,7 +140,12 @@ pub(super) fn against_depth(
         ("the scan is in millimetres", "convert the scan to metres", placed, 1e-3),
         ("the scan is in centimetres", "convert the scan to metres", placed, 1e-2),
         ("the scan's points are a thousandth of metres", "convert the scan to metres", placed, 1e3),
-        ("the scan's place in the world is inverted", "give world_from_cloud, not cloud_from_world", turned, 1.0),
+        (
+            "the scan's place in the world is inverted",
+            "give world_from_cloud, not cloud_from_world",
+            turned,
+            1.0,
+        ),
         (
             "the scan lies in the world already",
             "its place in the world is none: give the identity",
@@ -148,7 +156,10 @@ pub(super) fn against_depth(
     for (words, mend, world_from_cloud, unit_m) in tried {
         let then = ratios(&world_from_cloud, unit_m);
         if then.enough() && then.share(1.0) >= AGREE {
-            let says = format!("{words}: so read, it agrees with the depth images at {:.0} % of the places", 100.0 * then.share(1.0));
+            let says = format!(
+                "{words}: so read, it agrees with the depth images at {:.0} % of the places",
+                100.0 * then.share(1.0)
+            );
             return Some(say(State::Wrong, says).mend(mend));
         }
     }

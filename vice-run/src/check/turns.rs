@@ -65,7 +65,8 @@ pub(super) fn look(dataset: &dyn Dataset, camera: &str, sources: &[Source<'_>]) 
         let answer = clock_offset(expected.as_ref().unwrap_or(source.turning), &turning, None);
         found.push(images_finding(source.name, camera, &answer));
         if let (Some(expected), Some(given)) = (expected, given) {
-            let subject = Subject { camera, source: source.name, is_body: source.is_body, given, others: &others };
+            let subject =
+                Subject { camera, source: source.name, is_body: source.is_body, given, others: &others };
             let answer = hand_eye(&expected, &turning, lag_s(&answer), source.is_gyro);
             found.push(hand_eye::finding(&subject, &answer));
         }
@@ -134,7 +135,9 @@ fn turns(
             let near = |i: usize, k: usize| frames[k].since(frames[i]) <= FURTHEST;
             let decoded: Vec<(usize, Option<Pyramid>)> = few
                 .par_iter()
-                .map(|i| (*i, dataset.image(camera, *i).ok().and_then(|image| Pyramid::for_tracking(&image).ok())))
+                .map(|i| {
+                    (*i, dataset.image(camera, *i).ok().and_then(|image| Pyramid::for_tracking(&image).ok()))
+                })
                 .collect();
             let all: Vec<&(usize, Option<Pyramid>)> = before.iter().chain(&decoded).collect();
             let found: Vec<Option<UnitQuaternion<f64>>> = all
@@ -157,5 +160,6 @@ fn turns(
 /// The turn `first_from_second` of the camera; `None` where it is vague.
 fn turn(first: &Pyramid, second: &Pyramid, camera: &Camera, seed: usize) -> Option<UnitQuaternion<f64>> {
     let found = turned(&followed(first, second, camera), seed as u64)?;
-    (found.sd_rad < VAGUE_RAD).then(|| UnitQuaternion::from_rotation_matrix(&found.second_from_first).inverse())
+    (found.sd_rad < VAGUE_RAD)
+        .then(|| UnitQuaternion::from_rotation_matrix(&found.second_from_first).inverse())
 }
