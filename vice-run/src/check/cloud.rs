@@ -8,9 +8,9 @@ use vice_core::dataset::{CloudRef, Dataset, DepthImage};
 use vice_core::error::one_line;
 use vice_core::frames::{Camera as CameraFrame, Cloud as CloudFrame, Rigid, World};
 use vice_core::statistics::median;
+use vice_core::time::Span;
+use vice_core::trajectory::Trajectory;
 use vice_depth::{Cloud, CloudOptions, load_cloud};
-
-use super::images::World3d;
 
 /// Edge of a cell, pixels: of the points in it the nearest one counts, since it hides the others.
 const CELL_PX: usize = 6;
@@ -31,6 +31,13 @@ const WRONG: f64 = 0.2;
 const LOOK: f64 = 0.04;
 /// Depth that steps by more than this between neighbours is an edge, a share.
 const STEP: f32 = 0.05;
+
+/// What places cameras in the world in which scan and floor are.
+pub(super) struct World3d<'a> {
+    /// The reference, where there is one.
+    pub(super) anchor: Option<&'a Trajectory>,
+    pub(super) max_gap: Span,
+}
 
 /// A scan that was read.
 pub(super) struct Scan {

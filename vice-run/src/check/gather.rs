@@ -16,8 +16,8 @@ use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
 
 use super::CheckRequest;
-use super::images::{self, World3d};
-use super::{cloud, stereo, turns};
+use super::cloud::World3d;
+use super::{cloud, images, stereo, turns};
 use crate::error::{RunError, RunResult};
 use crate::open::Opened;
 
