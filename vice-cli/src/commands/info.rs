@@ -8,6 +8,7 @@ use vice_run::core::dataset::Probe;
 use vice_run::formats;
 use vice_run::info::describe;
 use vice_run::place::Place;
+use vice_run::progress::silent;
 
 use crate::inputs::DatasetArgs;
 use crate::terminal::{self, Outcome, printable};
@@ -35,7 +36,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     }
     let request = CheckRequest { dataset: spec.clone(), ..CheckRequest::default() };
     // What cannot be checked is said where it is asked for; what the data set holds is shown all the same.
-    let checked = check_open(&request, dataset.clone()).ok();
+    let checked = check_open(&request, dataset.clone(), &silent).ok();
     let text = describe(dataset.as_ref(), spec.camera.as_deref())?;
     let head = checked.map_or_else(String::new, |document| head(&document));
     terminal::print(&match text.split_once('\n') {

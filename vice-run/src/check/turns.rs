@@ -12,6 +12,8 @@ use vice_core::time::{Span, Stamp};
 use vice_track::Pyramid;
 use vice_track::two_view::{followed, turned};
 
+use crate::progress::Progress;
+
 /// Parts of the recording in each of which one run of frames is looked at.
 const RUNS: usize = 8;
 /// Frames that are decoded, at most, for images of up to this many pixels; fewer for larger ones, at least so many.
@@ -38,14 +40,19 @@ pub(super) struct Source<'a> {
 }
 
 /// Findings about the clock and the rotation of a camera, by its images.
-pub(super) fn look(dataset: &dyn Dataset, camera: &str, sources: &[Source<'_>]) -> Vec<Finding> {
+pub(super) fn look(
+    dataset: &dyn Dataset,
+    camera: &str,
+    sources: &[Source<'_>],
+    progress: &Progress<'_>,
+) -> Vec<Finding> {
     let (Ok(frames), Ok(model)) = (dataset.frames(camera), dataset.camera(camera)) else { return Vec::new() };
     let unknown = |says: &str| vec![Finding::new(hand_eye::CHECK.name, camera, State::Unknown, says)];
     let Some(first) = sources.first() else {
         return unknown("there are neither poses nor IMU to compare the turns of the images with");
     };
     let runs = runs(&frames, first.turning, budget(&model));
-    let Some(turning) = turns(dataset, camera, &model, &frames, &runs) else {
+    let Some(turning) = turns(dataset, camera, &model, (&frames, &runs), progress) else {
         return unknown("no two frames lie near enough to each other to follow points");
     };
     let extrinsics = |stamp: Stamp| Some(dataset.body_from_camera(camera, stamp).ok()?.rotation());
@@ -124,10 +131,11 @@ fn turns(
     dataset: &dyn Dataset,
     camera: &str,
     model: &Camera,
-    frames: &[Stamp],
-    runs: &[Vec<usize>],
+    (frames, runs): (&[Stamp], &[Vec<usize>]),
+    progress: &Progress<'_>,
 ) -> Option<Turning> {
     let mut steps = Vec::new();
+    let total: usize = runs.iter().map(Vec::len).sum();
     for run in runs {
         // A few at a time, so that memory stays bounded; the last one begins the next few.
         let mut before: Option<(usize, Option<Pyramid>)> = None;
@@ -152,6 +160,7 @@ fn turns(
             }
             steps.extend(all.iter().skip(1).zip(found).map(|((k, _), step)| (frames[*k], step)));
             before = decoded.into_iter().next_back();
+            progress("turns of the camera by its images", steps.len(), total);
         }
     }
     steps.iter().any(|(_, step)| step.is_some()).then(|| Turning::of_steps(&steps)).flatten()
