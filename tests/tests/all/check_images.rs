@@ -38,7 +38,11 @@ fn copy(from: &Path, to: &Path) {
         match entry.path() {
             path if path.is_dir() => copy(&path, &there),
             path if path.extension().is_some_and(|e| e == "png") => {
-                fs::hard_link(&path, &there).map(|()| 0).or_else(|_| fs::copy(&path, &there)).map(|_| ()).unwrap();
+                fs::hard_link(&path, &there)
+                    .map(|()| 0)
+                    .or_else(|_| fs::copy(&path, &there))
+                    .map(|_| ())
+                    .unwrap();
             }
             path => {
                 fs::copy(&path, &there).unwrap();
@@ -63,7 +67,8 @@ fn about<'a>(document: &'a Value, check: &str, about: &str) -> &'a Value {
 
 fn wrongs(document: &Value) -> Vec<String> {
     let list = document["findings"].as_array().unwrap().iter().filter(|f| f["state"] == "wrong");
-    list.map(|f| format!("{}: {}", f["check"].as_str().unwrap(), f["about"].as_str().unwrap_or_default())).collect()
+    list.map(|f| format!("{}: {}", f["check"].as_str().unwrap(), f["about"].as_str().unwrap_or_default()))
+        .collect()
 }
 
 fn number(finding: &Value, name: &str) -> f64 {
@@ -117,7 +122,10 @@ fn spoiled_extrinsics_are_found_by_what_they_are_off() {
         about(&check(&path, &[]), "hand-eye", "imu / cam0").clone()
     };
     let inverse = spoiled("inverse", &|r| r.inverse());
-    assert!(inverse["state"] == "wrong" && inverse["says"].as_str().unwrap().contains("inverse"), "{inverse:#}");
+    assert!(
+        inverse["state"] == "wrong" && inverse["says"].as_str().unwrap().contains("inverse"),
+        "{inverse:#}"
+    );
     for (name, axis) in [("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0]), ("z", [0.0, 0.0, 1.0])] {
         let axis = nalgebra::Vector3::from(axis);
         let off = spoiled(name, &|r| r * UnitQuaternion::from_scaled_axis(axis * 6_f64.to_radians()));
@@ -160,8 +168,9 @@ fn a_camera_that_is_late_is_found_by_its_images() {
 #[test]
 fn nothing_is_called_wrong_in_real_images_that_is_not() {
     for (path, hand_eye) in [
-        ("euroc_v1_01", None),
-        ("visp_tags_rgbd", Some("ground-truth / cam0")),
+        ("euroc_v1_01", Some("imu / cam0")),
+        // Hardly any motion, and tags that place the camera with noise: nothing is said.
+        ("visp_tags_rgbd", None),
         ("hololens_rgbd", Some("ground-truth / cam0")),
         ("chess_opencv", None),
     ] {

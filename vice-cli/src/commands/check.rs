@@ -7,13 +7,13 @@ use vice_run::core::check::State;
 
 use crate::inputs::{DatasetArgs, PoseArgs, to_json};
 use crate::outputs::Outputs;
-use crate::terminal::{self, Outcome};
+use crate::terminal::{self, Outcome, Verbosity, with_progress};
 
 /// Arguments of `vice check`.
 #[derive(Debug, clap::Args)]
 #[command(
     mut_arg("path", |a| a.required(false).required_unless_present("list")),
-    after_help = "Examples:\n  vice check V1_01_easy\n  vice check my_run --estimate odom.tum,slam.tum --json found.json\n  vice check --list\n\n\
+    after_help = "Examples:\n  vice check V1_01_easy\n  vice check my_run --estimate odom.tum,slam.tum --json found.json\n  vice check my_run --images\n  vice check --list\n\n\
     Exit codes: 0 nothing is wrong, 3 something is wrong, else as ever. `unknown` is no praise: its line says why."
 )]
 pub(crate) struct Args {
@@ -49,14 +49,14 @@ impl Args {
     }
 }
 
-pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
     if args.list {
         terminal::print(&list_text())?;
         return Ok(Outcome::Done);
     }
     let request = args.request();
     let outputs = Outputs::new(&[&args.json, &args.report], &request.inputs())?;
-    let document = check(&request)?;
+    let document = with_progress(verbosity, |progress| check(&request, progress))?;
     let mut texts = Vec::new();
     if let Some(path) = &args.json {
         texts.push((path, to_json(&document)?));

@@ -9,6 +9,7 @@ use vice_run::formats;
 use vice_run::info::describe;
 use vice_run::info_document::document;
 use vice_run::place::Place;
+use vice_run::progress::silent;
 
 use crate::inputs::{CalibrationArgs, DatasetArgs};
 use crate::outputs::JsonArgs;
@@ -43,7 +44,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     }
     let request = CheckRequest { dataset: spec.clone(), ..CheckRequest::default() };
     // What cannot be checked is said where it is asked for; what the data set holds is shown all the same.
-    let checked = check_open(&request, raw.clone()).ok();
+    let checked = check_open(&request, raw.clone(), &silent).ok();
     let (dataset, said) = match args.calibration.says_something() {
         true => {
             let opened = spec.apply_to(raw)?;
@@ -54,8 +55,8 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     };
     let inputs: Vec<PathBuf> = args.dataset.path.iter().cloned().collect();
     if args.json.json.as_deref() == Some(Path::new("-")) {
-        let document = document(dataset.as_ref(), spec.camera.as_deref());
-        args.json.put(&inputs, &document, verbosity, String::new)?;
+        let shown = document(dataset.as_ref(), spec.camera.as_deref());
+        args.json.put(&inputs, &shown, verbosity, String::new)?;
         return Ok(Outcome::Done);
     }
     let mut text = describe(dataset.as_ref(), spec.camera.as_deref())?;
@@ -70,8 +71,8 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         Some((first, rest)) => format!("{first}\n{head}{rest}"),
         None => text,
     };
-    let document = args.json.json.as_ref().map(|_| document(dataset.as_ref(), spec.camera.as_deref()));
-    args.json.put(&inputs, &document, verbosity, || text)?;
+    let shown = args.json.json.as_ref().map(|_| document(dataset.as_ref(), spec.camera.as_deref()));
+    args.json.put(&inputs, &shown, verbosity, || text)?;
     Ok(Outcome::Done)
 }
 

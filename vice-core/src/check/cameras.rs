@@ -52,7 +52,8 @@ pub fn cameras(about: &str, seen: &[Sighted], given: &Rigid<Camera, Camera>) -> 
     }
     let off: Vec<Vector3<f64>> =
         seen.iter().map(|s| rotation_vector_rad(&(s.turn * given.rotation().inverse()))).collect();
-    let middle = |f: &dyn Fn(&Vector3<f64>) -> f64| median(&mut off.iter().map(f).collect::<Vec<_>>()).unwrap_or(0.0);
+    let middle =
+        |f: &dyn Fn(&Vector3<f64>) -> f64| median(&mut off.iter().map(f).collect::<Vec<_>>()).unwrap_or(0.0);
     let turn = Vector3::from_fn(|i, _| middle(&|v| v[i]));
     // A median is less sure than a mean, by this factor; the median of deviations is 0.6745 standard deviations.
     let t = quantile_975(seen.len() as f64 - 1.0).unwrap_or(f64::INFINITY);
@@ -76,11 +77,14 @@ pub fn cameras(about: &str, seen: &[Sighted], given: &Rigid<Camera, Camera>) -> 
         (State::Ok, _) => {
             format!("both lie as their extrinsics say, within {} degrees", degrees(turn.norm() + half.max()))
         }
-        (_, Some(a)) if beyond <= LOOK_RAD => format!(
+        (_, Some(a)) if beyond <= LOOK_RAD || a > WRONG_ALONG_RAD => format!(
             "by the images the second camera lies in another direction from the first than the extrinsics say, {} degrees off",
             degrees(a)
         ),
-        _ => format!("by the images both are turned by {} degrees against their extrinsics", degrees(turn.norm())),
+        _ => format!(
+            "by the images both are turned by {} degrees against their extrinsics",
+            degrees(turn.norm())
+        ),
     };
     let finding = Finding::new(CHECK.name, about, state, says)
         .number("off", turn.norm().to_degrees(), "degrees")
@@ -100,9 +104,8 @@ fn direction(seen: &[Sighted], given: &Rigid<Camera, Camera>) -> Option<f64> {
     if known.len() < FEWEST {
         return None;
     }
-    let middle: Vector3<f64> = Vector3::from_fn(|i, _| {
-        median(&mut known.iter().map(|v| v[i]).collect::<Vec<_>>()).unwrap_or(0.0)
-    });
+    let middle: Vector3<f64> =
+        Vector3::from_fn(|i, _| median(&mut known.iter().map(|v| v[i]).collect::<Vec<_>>()).unwrap_or(0.0));
     let spread = median(&mut known.iter().map(|v| v.angle(&middle)).collect::<Vec<_>>())?;
     (spread < SPREAD_ALONG_RAD).then(|| middle.angle(&expected))
 }
@@ -113,8 +116,10 @@ mod tests {
     use crate::random::SplitMix;
 
     fn said(turned: f64, swapped: bool, count: usize) -> Finding {
-        let truth: Rigid<Camera, Camera> =
-            Rigid::from_parts(Vector3::new(-0.11, 0.001, 0.002), UnitQuaternion::from_euler_angles(0.01, -0.02, 0.0));
+        let truth: Rigid<Camera, Camera> = Rigid::from_parts(
+            Vector3::new(-0.11, 0.001, 0.002),
+            UnitQuaternion::from_euler_angles(0.01, -0.02, 0.0),
+        );
         let mut random = SplitMix::new(1);
         let seen: Vec<Sighted> = (0..count)
             .map(|i| {

@@ -283,6 +283,13 @@ pub fn finding(subject: &Subject<'_>, found: &Result<HandEye, HandEyeDoubt>) -> 
     if state == State::Wrong && !subject.is_body && cause.is_none() {
         state = State::Look;
     }
+    let other = subject.others.iter().find(|(_, other)| seen.angle_to(other) < WRONG_RAD);
+    let other = match (state, &cause, other) {
+        (State::Wrong, None, Some((name, _))) if found.only_axis.is_none() => {
+            format!("; those of {name} would fit: see whether two cameras were exchanged")
+        }
+        _ => String::new(),
+    };
     let degrees = short((1e2 * angle.to_degrees()).round() / 1e2);
     let part = match found.only_axis {
         Some(_) => " (the camera turns about one axis only: the angle about it is not known)",
@@ -290,14 +297,18 @@ pub fn finding(subject: &Subject<'_>, found: &Result<HandEye, HandEyeDoubt>) -> 
     };
     let says = match (state, &cause) {
         (State::Ok, _) => {
-            format!("{camera} turns as {source} does through its extrinsics, within {degrees} degrees{part}")
+            let within = (1e2 * (angle + found.half_95_rad).to_degrees()).ceil() / 1e2;
+            format!(
+                "{camera} turns as {source} does through its extrinsics, within {} degrees{part}",
+                short(within)
+            )
         }
         (_, Some((words, _))) => format!(
             "{camera} does not turn as {source} does through its extrinsics, {degrees} degrees off: {words}"
         ),
         _ => {
             format!(
-                "by its images {camera} is turned by {degrees} degrees against its extrinsics, as {source} turns{part}"
+                "by its images {camera} is turned by {degrees} degrees against its extrinsics, as {source} turns{part}{other}"
             )
         }
     };
@@ -310,6 +321,9 @@ pub fn finding(subject: &Subject<'_>, found: &Result<HandEye, HandEyeDoubt>) -> 
     match (state, cause) {
         (State::Ok, _) => finding,
         (_, Some((_, mend))) => finding.mend(mend),
+        _ if !subject.is_body => finding.mend(
+            "see whether its poses are of another frame than the body of the extrinsics: `estimate-frame` FILE says where that lies",
+        ),
         _ if found.only_axis.is_some() => {
             finding.mend("calibrate the extrinsics anew, or give right ones with `calibration`")
         }
@@ -355,12 +369,6 @@ fn cause(subject: &Subject<'_>, found: &HandEye, seen: &UnitQuaternion<f64>) -> 
                 format!("`estimate-as` camera for {}", subject.source),
             ),
         });
-    }
-    if let Some((name, _)) = subject.others.iter().find(|(_, other)| is(other)) {
-        return Some((
-            format!("those of {name} fit"),
-            calibration("see whether two cameras were exchanged, and give each its own"),
-        ));
     }
     let optical = UnitQuaternion::from_basis_unchecked(&[-Vector3::y(), -Vector3::z(), Vector3::x()]);
     for (axes, words) in [

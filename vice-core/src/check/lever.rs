@@ -67,7 +67,8 @@ pub(super) fn off_imu(
     let solved = solve(&rows, &[0.0, 0.0, 0.0, bias, bias, bias, 0.0, 0.0, 0.0])?;
     let lever = Vector3::new(solved.x[6], solved.x[7], solved.x[8]);
     let half = Vector3::new(solved.half_95[6], solved.half_95[7], solved.half_95[8]);
-    Some(said(name, "imu", "the IMU", (lever, half), OFF_IMU_M, camera))
+    let found = said(name, "imu", "the IMU", (lever, half), OFF_IMU_M, camera);
+    Some(found.number("acceleration-left", solved.left, "m/s²"))
 }
 
 /// The lever arm of an estimate against a reference, from relative motions `(reference, estimate)` in the order of time;
@@ -92,8 +93,9 @@ pub(super) fn off_reference(
     let solved = solve(&rows, &[0.0; 3])?;
     let part = |v: &nalgebra::DVector<f64>| Vector3::new(v[0], v[1], v[2]);
     let (lever, half) = (part(&solved.x), part(&solved.half_95));
-    let found = said(name, reference, &format!("that of {reference}"), (lever, half), OFF_REFERENCE_M, camera);
-    (found.state == State::Look).then_some(found)
+    let found =
+        said(name, reference, &format!("that of {reference}"), (lever, half), OFF_REFERENCE_M, camera);
+    (found.state == State::Look).then(|| found.number("way-left", solved.left, "m"))
 }
 
 fn said(
@@ -118,8 +120,8 @@ fn said(
             None => "",
         };
         let says = format!(
-            "the poses of {name} are of a point {} m off {other_words}, at {} in the body{whose}",
-            short(lever.norm()),
+            "the poses of {name} are of a point {:.3} m off {other_words}, at {} in the body{whose}",
+            lever.norm(),
             place(&lever)
         );
         let mend = "`estimate-frame` FILE says where the frame of the poses lies in the body";
@@ -128,12 +130,14 @@ fn said(
     if widest > WIDEST_M {
         let says = format!(
             "too uncertain: the body turns too little to tell where the point of {name} lies, within {} m",
-            short(widest)
+            short((1e3 * widest).ceil() / 1e3)
         );
         return numbers(Finding::new(CHECK.name, about, State::Unknown, says));
     }
-    let says =
-        format!("the poses of {name} are of the point of {other_words}, within {} m", short(lever.norm() + widest));
+    let says = format!(
+        "the poses of {name} are of the point of {other_words}, within {} m",
+        short((1e3 * (lever.norm() + widest)).ceil() / 1e3)
+    );
     numbers(Finding::new(CHECK.name, about, State::Ok, says))
 }
 
@@ -205,7 +209,8 @@ mod tests {
                         sum += weight * (second + Vector3::new(0.0, 0.0, 9.81));
                         total += weight;
                     }
-                    let force = pose(t, false).rotation().inverse() * (sum / total) + Vector3::new(0.05, 0.1, -0.1);
+                    let force =
+                        pose(t, false).rotation().inverse() * (sum / total) + Vector3::new(0.05, 0.1, -0.1);
                     Swing { poses, force }
                 })
                 .collect();

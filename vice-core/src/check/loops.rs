@@ -35,11 +35,7 @@ const FEWEST: usize = 3;
 
 /// How an estimate closes the loops of a reference; nothing where there are none. `offset`: what is added to the estimate's
 /// stamps first.
-pub fn loops(
-    reference: (&str, &Trajectory),
-    estimate: (&str, &Trajectory),
-    offset: Span,
-) -> Option<Finding> {
+pub fn loops(reference: (&str, &Trajectory), estimate: (&str, &Trajectory), offset: Span) -> Option<Finding> {
     let spacing = |t: &Trajectory| t.median_spacing().map(|s| s.as_secs_f64());
     let gap = |t: &Trajectory| Span::from_secs_f64((2.5 * spacing(t)?).max(0.11)).ok();
     let (gap, own_gap) = (gap(reference.1)?, gap(estimate.1)?);
@@ -55,7 +51,8 @@ pub fn loops(
     for k in 0..=(seconds / step) as usize {
         let stamp = start.saturating_add(Span::from_secs_f64(k as f64 * step).ok()?);
         let own = Stamp::from_nanos(stamp.as_nanos().saturating_sub(offset.as_nanos()));
-        let (Ok(truth), Ok(pose)) = (reference.1.pose_at(stamp, gap), estimate.1.pose_at(own, own_gap)) else {
+        let (Ok(truth), Ok(pose)) = (reference.1.pose_at(stamp, gap), estimate.1.pose_at(own, own_gap))
+        else {
             continue;
         };
         if let Some((_, before, _, _)) = rows.last() {
@@ -68,8 +65,7 @@ pub fn loops(
     for (i, (t, truth, pose, way)) in rows.iter().enumerate() {
         // The nearest later visit.
         let later = rows[i + 1..].iter().filter(|r| r.0 - t > APART_S && r.3 - way > WAY_M);
-        let distance =
-            |r: &&(f64, _, _, f64)| (place(&r.1) - truth.translation()).norm();
+        let distance = |r: &&(f64, _, _, f64)| (place(&r.1) - truth.translation()).norm();
         let Some(again) = later.min_by(|a, b| distance(a).total_cmp(&distance(b))) else { continue };
         if distance(&again) > SAME_M {
             continue;
@@ -98,7 +94,8 @@ pub fn loops(
         .number("95%-quantile", worst, "m")
         .number("visits", count, "");
     Some(match state {
-        State::Look => finding.mend("poses of this stream place nothing in a map; its drift is what `vice evaluate` measures"),
+        State::Look => finding
+            .mend("poses of this stream place nothing in a map; its drift is what `vice evaluate` measures"),
         _ => finding,
     })
 }
@@ -119,7 +116,8 @@ mod tests {
             let t = f64::from(i) * 0.05;
             let angle = t * std::f64::consts::TAU / 20.0;
             let at = Vector3::new(2.0 * angle.cos() + drift * t, 2.0 * angle.sin(), 1.0);
-            let pose: WorldFromBody = Rigid::from_parts(at, UnitQuaternion::from_euler_angles(0.0, 0.0, angle));
+            let pose: WorldFromBody =
+                Rigid::from_parts(at, UnitQuaternion::from_euler_angles(0.0, 0.0, angle));
             (Stamp::from_nanos(i64::from(i) * 50_000_000), pose)
         });
         Trajectory::from_poses(rows.collect::<Vec<_>>()).unwrap()

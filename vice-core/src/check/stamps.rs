@@ -50,7 +50,8 @@ pub fn nominal(about: &str, what: &str, stamps: &[Stamp], rate_hz: f64) -> Optio
     let finding =
         Finding::new(CHECK.name, about, state, says).number("rate", hz, "Hz").number("named", rate_hz, "Hz");
     Some(match state {
-        State::Look => finding.mend("see whether stamps were made from a wrong frame rate: `vice check` compares the clocks"),
+        State::Look => finding
+            .mend("see whether stamps were made from a wrong frame rate: `vice check` compares the clocks"),
         _ => finding,
     })
 }

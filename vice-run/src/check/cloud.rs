@@ -8,9 +8,9 @@ use vice_core::dataset::{CloudRef, Dataset, DepthImage};
 use vice_core::error::one_line;
 use vice_core::frames::{Camera as CameraFrame, Cloud as CloudFrame, Rigid, World};
 use vice_core::statistics::median;
+use vice_core::time::Span;
+use vice_core::trajectory::Trajectory;
 use vice_depth::{Cloud, CloudOptions, load_cloud};
-
-use super::images::World3d;
 
 /// Edge of a cell, pixels: of the points in it the nearest one counts, since it hides the others.
 const CELL_PX: usize = 6;
@@ -31,6 +31,13 @@ const WRONG: f64 = 0.2;
 const LOOK: f64 = 0.04;
 /// Depth that steps by more than this between neighbours is an edge, a share.
 const STEP: f32 = 0.05;
+
+/// What places cameras in the world in which scan and floor are.
+pub(super) struct World3d<'a> {
+    /// The reference, where there is one.
+    pub(super) anchor: Option<&'a Trajectory>,
+    pub(super) max_gap: Span,
+}
 
 /// A scan that was read.
 pub(super) struct Scan {
@@ -109,10 +116,11 @@ pub(super) fn against_depth(
     let read = ratios(&placed, 1.0);
     let (middle, share) = (read.middle(), read.share(1.0));
     let numbers = |finding: Finding| {
-        finding
-            .number("middle-ratio", middle, "")
-            .number("share-that-agrees", share, "")
-            .number("places", read.0.len() as f64, "")
+        finding.number("middle-ratio", middle, "").number("share-that-agrees", share, "").number(
+            "places",
+            read.0.len() as f64,
+            "",
+        )
     };
     let say = |state, says: String| numbers(Finding::new(DEPTH.name, &about, state, says));
     if read.enough() && read.share(middle) >= AGREE {
@@ -129,7 +137,9 @@ pub(super) fn against_depth(
     }
     if read.enough() && share >= APART {
         let says = format!("scan and depth images agree at {:.0} % of the places only", 100.0 * share);
-        return Some(say(State::Look, says).mend("see whether the scan is of this scene, and where its frame lies"));
+        return Some(
+            say(State::Look, says).mend("see whether the scan is of this scene, and where its frame lies"),
+        );
     }
     // Units and frames that people mistake.
     let turned = placed.inverse().reinterpret::<World, CloudFrame>();
@@ -137,7 +147,12 @@ pub(super) fn against_depth(
         ("the scan is in millimetres", "convert the scan to metres", placed, 1e-3),
         ("the scan is in centimetres", "convert the scan to metres", placed, 1e-2),
         ("the scan's points are a thousandth of metres", "convert the scan to metres", placed, 1e3),
-        ("the scan's place in the world is inverted", "give world_from_cloud, not cloud_from_world", turned, 1.0),
+        (
+            "the scan's place in the world is inverted",
+            "give world_from_cloud, not cloud_from_world",
+            turned,
+            1.0,
+        ),
         (
             "the scan lies in the world already",
             "its place in the world is none: give the identity",
@@ -148,7 +163,10 @@ pub(super) fn against_depth(
     for (words, mend, world_from_cloud, unit_m) in tried {
         let then = ratios(&world_from_cloud, unit_m);
         if then.enough() && then.share(1.0) >= AGREE {
-            let says = format!("{words}: so read, it agrees with the depth images at {:.0} % of the places", 100.0 * then.share(1.0));
+            let says = format!(
+                "{words}: so read, it agrees with the depth images at {:.0} % of the places",
+                100.0 * then.share(1.0)
+            );
             return Some(say(State::Wrong, says).mend(mend));
         }
     }

@@ -16,10 +16,11 @@ use vice_core::time::{Span, Stamp};
 use vice_core::trajectory::Trajectory;
 
 use super::CheckRequest;
-use super::images::{self, World3d};
-use super::{cloud, stereo, turns};
+use super::cloud::World3d;
+use super::{cloud, images, stereo, turns};
 use crate::error::{RunError, RunResult};
 use crate::open::Opened;
+use crate::progress::Progress;
 
 /// The name of findings about what was repaired, left out or cannot be read.
 const READING: &str = "reading";
@@ -160,8 +161,8 @@ impl Gathered {
         Ok(())
     }
 
-    /// All findings.
-    pub(super) fn findings(&self, images: bool) -> Vec<Finding> {
+    /// All findings; those that need pictures where there is someone to tell how far that is.
+    pub(super) fn findings(&self, images: Option<&Progress<'_>>) -> Vec<Finding> {
         let mut found = self.read.clone();
         self.stamps(&mut found);
         self.calibration(&mut found);
@@ -172,8 +173,8 @@ impl Gathered {
         self.motions(&mut found, &offsets);
         self.inertial(&mut found, &offsets);
         found.extend(self.dataset.checks());
-        if images {
-            self.pictures(&mut found);
+        if let Some(progress) = images {
+            self.pictures(&mut found, progress);
         }
         // Asked last: readers doubt while they read.
         let mut suspicions: Suspicions = self.dataset.suspicions().into_iter().collect();
@@ -219,7 +220,7 @@ impl Gathered {
         }
     }
 
-    fn pictures(&self, found: &mut Vec<Finding>) {
+    fn pictures(&self, found: &mut Vec<Finding>, progress: &Progress<'_>) {
         if self.cameras.is_empty() {
             found.push(Finding::new("images", "", State::Unknown, "there is no camera"));
         }
@@ -240,7 +241,7 @@ impl Gathered {
         });
         let sources: Vec<turns::Source<'_>> = gyro.into_iter().chain(streams).collect();
         for camera in &self.cameras {
-            found.extend(turns::look(self.dataset.as_ref(), camera, &sources));
+            found.extend(turns::look(self.dataset.as_ref(), camera, &sources, progress));
         }
         // Each against the first one: others follow.
         if let Some((first, others)) = self.cameras.split_first() {

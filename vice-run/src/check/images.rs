@@ -7,10 +7,9 @@ use vice_core::check::{Finding, State, short};
 use vice_core::dataset::{Dataset, Floor, Plane, depth_unit_doubt};
 use vice_core::frames::World;
 use vice_core::time::Span;
-use vice_core::trajectory::Trajectory;
 use vice_depth::{FloorFit, FloorFitOptions, fit_floor_to_cloud, fit_floor_to_depth_image};
 
-use super::cloud::{self, Scan};
+use super::cloud::{self, Scan, World3d};
 
 /// Places of the recording that are looked at; at each two neighbouring frames.
 const PLACES: usize = 12;
@@ -23,13 +22,6 @@ const FLOOR_M: f64 = 0.05;
 const FLOOR_DEG: f64 = 3.0;
 /// A fitted plane with less of the points is none to compare with.
 const FLOOR_SHARE: f64 = 0.1;
-
-/// What depth and floor are compared with.
-pub(super) struct World3d<'a> {
-    /// What places the camera in the world of the floor.
-    pub(super) anchor: Option<&'a Trajectory>,
-    pub(super) max_gap: Span,
-}
 
 /// Findings about the pictures of a camera.
 pub(super) fn look(

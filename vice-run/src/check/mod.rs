@@ -27,6 +27,7 @@ pub use text::{head, list_text, render};
 
 use crate::error::RunResult;
 use crate::formats;
+use crate::progress::Progress;
 use crate::request::{DatasetSpec, Request, StreamsSpec};
 
 /// What is checked.
@@ -83,22 +84,26 @@ impl CheckRequest {
     }
 }
 
-/// Checks a recording.
+/// Checks a recording. `progress` is told how many images of how many were looked at.
 ///
 /// # Errors
 /// [`RunError`](crate::error::RunError) if no format reads it, or a stream that is named cannot be read.
-pub fn check(request: &CheckRequest) -> RunResult<CheckDocument> {
+pub fn check(request: &CheckRequest, progress: &Progress<'_>) -> RunResult<CheckDocument> {
     let spec = &request.dataset;
-    check_open(request, spec.open_raw(&formats::registry(&spec.plugins)?)?)
+    check_open(request, spec.open_raw(&formats::registry(&spec.plugins)?)?, progress)
 }
 
 /// Checks a recording that is open already, as the request's data set without its overrides.
 ///
 /// # Errors
 /// As [`check`].
-pub fn check_open(request: &CheckRequest, dataset: Arc<dyn Dataset>) -> RunResult<CheckDocument> {
+pub fn check_open(
+    request: &CheckRequest,
+    dataset: Arc<dyn Dataset>,
+    progress: &Progress<'_>,
+) -> RunResult<CheckDocument> {
     let gathered = gather::gather(request, dataset)?;
-    let mut findings = gathered.findings(request.images);
+    let mut findings = gathered.findings(request.images.then_some(progress));
     findings.sort_by_key(place);
     let count = |state: State| findings.iter().filter(|f| f.state == state).count();
     Ok(CheckDocument {

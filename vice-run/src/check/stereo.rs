@@ -29,12 +29,14 @@ pub(super) fn look(dataset: &dyn Dataset, first: &str, second: &str) -> Option<F
         }
     }
     let count = MOMENTS.min(same.len());
-    let moments: Vec<(usize, usize)> = (0..count).map(|m| same[(2 * m + 1) * same.len() / (2 * count)]).collect();
+    let moments: Vec<(usize, usize)> =
+        (0..count).map(|m| same[(2 * m + 1) * same.len() / (2 * count)]).collect();
     let stamp = frames[moments.first()?.0];
     let place = |camera: &str| dataset.body_from_camera(camera, stamp).ok();
     let second_from_first: Rigid<CameraFrame, CameraFrame> = place(second)?.inverse() * place(first)?;
     let sighted = |(i, k): &(usize, usize)| {
-        let picture = |camera: &str, index: usize| Pyramid::for_tracking(&dataset.image(camera, index).ok()?).ok();
+        let picture =
+            |camera: &str, index: usize| Pyramid::for_tracking(&dataset.image(camera, index).ok()?).ok();
         let pairs = between(&picture(first, *i)?, &picture(second, *k)?, &one, &other);
         let found = turned(&pairs, *i as u64).filter(|f| f.sd_rad < VAGUE_RAD)?;
         let turn = UnitQuaternion::from_rotation_matrix(&found.second_from_first);

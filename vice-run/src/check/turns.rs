@@ -12,6 +12,8 @@ use vice_core::time::{Span, Stamp};
 use vice_track::Pyramid;
 use vice_track::two_view::{followed, turned};
 
+use crate::progress::Progress;
+
 /// Parts of the recording in each of which one run of frames is looked at.
 const RUNS: usize = 8;
 /// Frames that are decoded, at most, for images of up to this many pixels; fewer for larger ones, at least so many.
@@ -38,14 +40,19 @@ pub(super) struct Source<'a> {
 }
 
 /// Findings about the clock and the rotation of a camera, by its images.
-pub(super) fn look(dataset: &dyn Dataset, camera: &str, sources: &[Source<'_>]) -> Vec<Finding> {
+pub(super) fn look(
+    dataset: &dyn Dataset,
+    camera: &str,
+    sources: &[Source<'_>],
+    progress: &Progress<'_>,
+) -> Vec<Finding> {
     let (Ok(frames), Ok(model)) = (dataset.frames(camera), dataset.camera(camera)) else { return Vec::new() };
     let unknown = |says: &str| vec![Finding::new(hand_eye::CHECK.name, camera, State::Unknown, says)];
     let Some(first) = sources.first() else {
         return unknown("there are neither poses nor IMU to compare the turns of the images with");
     };
     let runs = runs(&frames, first.turning, budget(&model));
-    let Some(turning) = turns(dataset, camera, &model, &frames, &runs) else {
+    let Some(turning) = turns(dataset, camera, &model, (&frames, &runs), progress) else {
         return unknown("no two frames lie near enough to each other to follow points");
     };
     let extrinsics = |stamp: Stamp| Some(dataset.body_from_camera(camera, stamp).ok()?.rotation());
@@ -65,7 +72,8 @@ pub(super) fn look(dataset: &dyn Dataset, camera: &str, sources: &[Source<'_>]) 
         let answer = clock_offset(expected.as_ref().unwrap_or(source.turning), &turning, None);
         found.push(images_finding(source.name, camera, &answer));
         if let (Some(expected), Some(given)) = (expected, given) {
-            let subject = Subject { camera, source: source.name, is_body: source.is_body, given, others: &others };
+            let subject =
+                Subject { camera, source: source.name, is_body: source.is_body, given, others: &others };
             let answer = hand_eye(&expected, &turning, lag_s(&answer), source.is_gyro);
             found.push(hand_eye::finding(&subject, &answer));
         }
@@ -123,10 +131,11 @@ fn turns(
     dataset: &dyn Dataset,
     camera: &str,
     model: &Camera,
-    frames: &[Stamp],
-    runs: &[Vec<usize>],
+    (frames, runs): (&[Stamp], &[Vec<usize>]),
+    progress: &Progress<'_>,
 ) -> Option<Turning> {
     let mut steps = Vec::new();
+    let total: usize = runs.iter().map(Vec::len).sum();
     for run in runs {
         // A few at a time, so that memory stays bounded; the last one begins the next few.
         let mut before: Option<(usize, Option<Pyramid>)> = None;
@@ -134,7 +143,9 @@ fn turns(
             let near = |i: usize, k: usize| frames[k].since(frames[i]) <= FURTHEST;
             let decoded: Vec<(usize, Option<Pyramid>)> = few
                 .par_iter()
-                .map(|i| (*i, dataset.image(camera, *i).ok().and_then(|image| Pyramid::for_tracking(&image).ok())))
+                .map(|i| {
+                    (*i, dataset.image(camera, *i).ok().and_then(|image| Pyramid::for_tracking(&image).ok()))
+                })
                 .collect();
             let all: Vec<&(usize, Option<Pyramid>)> = before.iter().chain(&decoded).collect();
             let found: Vec<Option<UnitQuaternion<f64>>> = all
@@ -149,6 +160,7 @@ fn turns(
             }
             steps.extend(all.iter().skip(1).zip(found).map(|((k, _), step)| (frames[*k], step)));
             before = decoded.into_iter().next_back();
+            progress("turns of the camera by its images", steps.len(), total);
         }
     }
     steps.iter().any(|(_, step)| step.is_some()).then(|| Turning::of_steps(&steps)).flatten()
@@ -157,5 +169,6 @@ fn turns(
 /// The turn `first_from_second` of the camera; `None` where it is vague.
 fn turn(first: &Pyramid, second: &Pyramid, camera: &Camera, seed: usize) -> Option<UnitQuaternion<f64>> {
     let found = turned(&followed(first, second, camera), seed as u64)?;
-    (found.sd_rad < VAGUE_RAD).then(|| UnitQuaternion::from_rotation_matrix(&found.second_from_first).inverse())
+    (found.sd_rad < VAGUE_RAD)
+        .then(|| UnitQuaternion::from_rotation_matrix(&found.second_from_first).inverse())
 }

@@ -10,9 +10,9 @@ use vice_core::dataset::{
     CloudRef, CloudSource, Dataset, DepthImage, Fact, Floor, Image, OpenOptions, Plane,
 };
 use vice_core::error::{DataError, DataResult, one_line};
+use vice_core::finding::{Finding, State};
 use vice_core::frames::BodyFromCamera;
 use vice_core::imu::{ImuSample, InertialState};
-use vice_core::finding::{Finding, State};
 use vice_core::suspicion::Suspicion;
 use vice_core::time::Stamp;
 use vice_core::trajectory::Trajectory;

@@ -77,7 +77,11 @@ impl Pieces {
 
     /// The turn rates of another source over the same stretches, where `moment` takes a time of this source to one of the
     /// other; `None` where the other is not known.
-    pub(in super::super) fn seen_by(&self, other: &Turning, moment: impl Fn(f64) -> f64) -> Vec<Option<Vector3<f64>>> {
+    pub(in super::super) fn seen_by(
+        &self,
+        other: &Turning,
+        moment: impl Fn(f64) -> f64,
+    ) -> Vec<Option<Vector3<f64>>> {
         let moments = self.ends.iter().flat_map(|(from, to)| [moment(*from), moment(*to)]);
         let known = other.at(moments);
         let pairs = known.chunks_exact(2).zip(&self.ends);

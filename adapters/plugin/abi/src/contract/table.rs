@@ -3,8 +3,8 @@
 use std::ffi::c_void;
 
 use super::values::{
-    Camera, Cloud, DatasetInfo, DepthImage, Facts, Findings, Floor, Host, Image, ImageFile, ImuSamples, InertialState,
-    Message, Motions, Poses, Probe, Rigid, Setting, SettingInfo, Stamps, Suspicions, Text,
+    Camera, Cloud, DatasetInfo, DepthImage, Facts, Findings, Floor, Host, Image, ImageFile, ImuSamples,
+    InertialState, Message, Motions, Poses, Probe, Rigid, Setting, SettingInfo, Stamps, Suspicions, Text,
 };
 
 /// Name of the one exported symbol, an [`Entry`].
