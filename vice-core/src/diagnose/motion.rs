@@ -255,10 +255,10 @@ pub(super) struct Reader<'a> {
 
 impl Reader<'_> {
     pub(super) fn at(&self, t_s: f64) -> WorldFromBody {
-        self.from_unscaled(self.unscaled_at(t_s), t_s)
+        self.put_back(self.unscaled_at(t_s), t_s)
     }
 
-    /// The same with its scale and velocity.
+    /// The same with its scale and velocity left in.
     pub(super) fn unscaled_at(&self, t_s: f64) -> WorldFromBody {
         let read_s = self.read_s(t_s);
         match &self.turned {
@@ -275,8 +275,8 @@ impl Reader<'_> {
         t_s * (1.0 + self.fast) + self.late_s + step
     }
 
-    /// The pose at a true time without scale and velocity, from that with them.
-    pub(super) fn from_unscaled(&self, pose: WorldFromBody, t_s: f64) -> WorldFromBody {
+    /// The pose at a true time without scale and velocity, from that of [`Reader::unscaled_at`].
+    pub(super) fn put_back(&self, pose: WorldFromBody, t_s: f64) -> WorldFromBody {
         if self.longer == 1.0 && self.velocity == Vector3::zeros() {
             return pose;
         }

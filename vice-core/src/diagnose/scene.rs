@@ -233,7 +233,7 @@ impl<'a> Scene<'a> {
             let read = self
                 .kept_or(key(&unscaled), || self.frames.iter().map(|f| reader.unscaled_at(f.t_s)).collect());
             let frames = self.frames.iter().zip(&*read);
-            frames.map(|(f, pose)| reader.from_unscaled(*pose, f.t_s)).collect()
+            frames.map(|(f, pose)| reader.put_back(*pose, f.t_s)).collect()
         })
     }
 

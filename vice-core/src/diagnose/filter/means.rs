@@ -33,7 +33,7 @@ impl Means {
     }
 
     /// A number of the state, in all columns.
-    #[inline(always)]
+    #[cfg(test)]
     pub(super) fn row(&self, number: usize) -> &[f64] {
         &self.values[number * self.width..(number + 1) * self.width]
     }
