@@ -337,7 +337,9 @@ fn with_axis(words: &[String]) -> Option<(Quantity, Option<Axis>)> {
     };
     let has = |list: &[&str]| stems.iter().any(|s| list.contains(s));
     let (turns, speeds_up) = (
-        has(&["gyro", "gyr", "gyroscope", "omega", "angular", "rate", "bg", "bw"]),
+        has(&["gyro", "gyr", "gyroscope", "omega", "angular", "rate", "bg", "bw"])
+            // `ang_x` alone may be an angle.
+            || (has(&["ang"]) && has(&["vel", "velocity"])),
         has(&["acc", "accel", "acceleration", "accelerometer", "ba"]),
     );
     let bias = has(&["bias", "bg", "ba", "bw"]) || (stems.first() == Some(&"b") && stems.len() > 1);

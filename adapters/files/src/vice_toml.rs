@@ -253,7 +253,10 @@ impl ViceToml {
                         None | Some("body") => false,
                         Some("camera") => true,
                         Some(other) => {
-                            return Err(wrong(&name, format!("frame = `{other}` is neither body nor camera")));
+                            return Err(wrong(
+                                &name,
+                                format!("frame = `{other}` is neither body nor camera"),
+                            ));
                         }
                     };
                     StreamEntry { file: table.file, of_camera, times: table.times }

@@ -1,5 +1,7 @@
 //! What a folder holds that nobody described: what is sure, what is guessed, and what cannot be known.
 
+mod told_by;
+
 use std::path::{Path, PathBuf};
 
 use vice_core::dataset::GROUND_TRUTH;
@@ -11,10 +13,9 @@ use vice_files::imu_file;
 use vice_files::trajectory::{ReadOptions, looks_like_poses, read};
 
 use crate::calibration::candidates;
-use crate::files::{entries, folders, has_picture, name, number_in, pictures, stem};
+use crate::files::{entries, folders, has_picture, name, pictures, stem};
 use crate::layouts::ALL;
-use crate::list::List;
-use crate::stamps::Unit;
+use told_by::{list_of, unit_of};
 
 /// Rates that cameras have, Hz: a rate that follows from counts is believed near one of these.
 const USUAL_HZ: [f64; 16] =
@@ -85,9 +86,9 @@ pub fn guess(folder: &Path, fps: Option<f64>) -> DataResult<Guess> {
     if !folder.is_dir() {
         return Err(DataError::of_kind(ErrorKind::Missing, "no such folder").at(folder));
     }
-    let mut guess = Guess::default();
     // What is described is described anew.
-    guess.layout = ALL.iter().skip(1).find(|layout| (layout.is)(folder)).map(|layout| layout.name);
+    let layout = ALL.iter().skip(1).find(|layout| (layout.is)(folder)).map(|layout| layout.name);
+    let mut guess = Guess { layout, ..Guess::default() };
     let files: Vec<PathBuf> = entries(folder)?.into_iter().filter(|p| p.is_file()).collect();
     guess.calibration(folder);
     let trajectories = guess.trajectories(&files);
@@ -364,60 +365,4 @@ fn is_truth(name: &str) -> bool {
     ["groundtruth", "ground"].iter().any(|w| name.contains(w))
         || words.contains(&"gt")
         || words.contains(&"vicon")
-}
-
-/// The list that is of these pictures: it names one of them, or has a stamp for each.
-fn list_of(
-    there: &[PathBuf],
-    files: &[PathBuf],
-    folder: &Path,
-    trajectories: &[(PathBuf, Trajectory)],
-) -> Option<PathBuf> {
-    let place = there.first()?.parent()?;
-    let tables = |p: &&PathBuf| p.extension().is_some_and(|e| e == "txt" || e == "csv");
-    let beside = entries(place).unwrap_or_default();
-    let above = place.parent().map(|p| entries(p).unwrap_or_default()).unwrap_or_default();
-    let mut candidates: Vec<PathBuf> = files.iter().filter(tables).cloned().collect();
-    if place != folder {
-        candidates.extend(beside.iter().chain(&above).filter(tables).filter(|p| p.is_file()).cloned());
-    }
-    candidates.retain(|p| p.parent() == Some(folder) && !trajectories.iter().any(|(t, _)| t == p));
-    let lists: Vec<List> = candidates.iter().filter_map(|p| List::read(p).ok()).collect();
-    let names_one = |list: &&List| {
-        let named = list.rows.iter().take(100).filter_map(|r| r.file.as_deref());
-        named.into_iter().any(|file| there.iter().any(|p| p.ends_with(file)))
-    };
-    let times = |list: &&List| {
-        let stem = stem(&list.path).to_ascii_lowercase();
-        list.rows.iter().all(|r| r.file.is_none())
-            && list.rows.len() == there.len()
-            && ["time", "stamp"].iter().any(|w| stem.contains(w))
-    };
-    lists.iter().find(names_one).or_else(|| lists.iter().find(times)).map(|list| list.path.clone())
-}
-
-/// The unit of the numbers in the names, where they can be stamps: today's epoch, or fractions of seconds.
-fn unit_of(there: &[PathBuf]) -> Option<Unit> {
-    let stems: Vec<String> = there.iter().map(|p| stem(p)).collect();
-    let numbers: Vec<&str> = stems.iter().map(|s| number_in(s)).collect::<Option<_>>()?;
-    let fraction = numbers.iter().any(|n| n.contains('.'));
-    let unit = if fraction {
-        Unit::Seconds
-    } else {
-        // A stamp of today's epoch has so many digits.
-        let digits = numbers.iter().map(|n| n.trim_start_matches('0').len()).max()?;
-        let today = numbers.iter().all(|n| n.trim_start_matches('0').len() == digits);
-        match digits {
-            10 if today => Unit::Seconds,
-            13 if today => Unit::Milliseconds,
-            16 if today => Unit::Microseconds,
-            19 if today => Unit::Nanoseconds,
-            // Nanoseconds from the start of a simulation: too large to count pictures.
-            8..=18 => Unit::Nanoseconds,
-            _ => return None,
-        }
-    };
-    let mut stamps: Vec<Stamp> = numbers.iter().map(|n| unit.parse(n).ok()).collect::<Option<_>>()?;
-    stamps.sort();
-    stamps.windows(2).all(|w| w[0] < w[1]).then_some(unit)
 }

@@ -45,6 +45,7 @@ mod report_overlay;
 mod samples;
 mod synthetic;
 mod tracker_oracle;
+mod trajectory_many;
 mod trajectory_oracle;
 mod verdict;
 mod your_robot;

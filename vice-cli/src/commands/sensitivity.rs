@@ -14,7 +14,7 @@ use crate::terminal::{self, Outcome, Verbosity, with_progress};
 /// Arguments of `vice sensitivity`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
-    vice sensitivity V1_01_easy --labels floor.csv --estimate ground-truth --svg sensitivity.svg\n\n\
+    vice sensitivity V1_01_easy --labels floor.csv --estimate ground-truth --plot sensitivity.svg\n\n\
     Each flaw is injected into what is in use, both ways round, at growing size. `seen from` is the size at which\n\
     RMSE_2D is a tenth larger than it is now; `found from` the smallest size that `vice diagnose` finds nineteen times\n\
     of twenty. Labels that cannot show a flaw say `never` there.")]
@@ -30,7 +30,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     csv: Option<PathBuf>,
     /// The curves as a picture.
-    #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
+    #[arg(long = "plot", alias = "svg", value_name = "FILE.svg", help_heading = "Output")]
     svg: Option<PathBuf>,
 }
 

@@ -34,6 +34,8 @@ fn names_of_every_tool_are_known() {
         says(name, Rotation, Axis::W, "");
     }
     says("q_RS_x", Rotation, Axis::X, "");
+    says("ang_vel_z", AngularRate, Axis::Z, "");
+    says("lin_acc_x", Acceleration, Axis::X, "");
     says("qk", Rotation, Axis::Z, "");
     for name in ["q0", "q[0]", "q_3", "quat1"] {
         says(name, RotationByNumber, None, "");

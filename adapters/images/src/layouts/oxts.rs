@@ -3,6 +3,7 @@
 //! Latitude, longitude and altitude become metres by Mercator's projection at the first packet's latitude, as the
 //! authors' development kit does it; roll, pitch and yaw are of the IMU: x forward, y left, z up, yaw from east.
 
+use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{UnitQuaternion, Vector3};
@@ -61,11 +62,12 @@ fn packets(folder: &Path) -> DataResult<Vec<Packet>> {
 /// Poses of the IMU: x to the east, y to the north, z up, from where it started.
 pub(crate) fn poses(folder: &Path) -> DataResult<Poses> {
     let packets = packets(folder)?;
-    let scale = packets.first().map_or(1.0, |p| p.v[0].to_radians().cos());
+    let scale = packets.first().map_or(1.0, |p| (p.v[0] * PI / 180.0).cos());
+    // In the order of operations of the development kit: so far from the equator a rounding is a nanometre.
     let place = |v: &[f64]| {
-        let (latitude, longitude) = (v[0].to_radians(), v[1].to_radians());
-        let north = (std::f64::consts::FRAC_PI_4 + latitude / 2.0).tan().ln();
-        Vector3::new(scale * EARTH_RADIUS_M * longitude, scale * EARTH_RADIUS_M * north, v[2])
+        let east = scale * v[1] * PI * EARTH_RADIUS_M / 180.0;
+        let north = scale * EARTH_RADIUS_M * ((90.0 + v[0]) * PI / 360.0).tan().ln();
+        Vector3::new(east, north, v[2])
     };
     let origin = packets.first().map_or_else(Vector3::zeros, |p| place(&p.v));
     let mut poses = Vec::with_capacity(packets.len());
