@@ -217,7 +217,7 @@ fn what_was_done_is_there_after_reopening_with_its_history() {
 }
 
 /// Flips a bit in a line of a journal.
-fn damage(path: &std::path::Path, line: usize) {
+fn damage(path: &Path, line: usize) {
     let bytes = fs::read(path).unwrap();
     let mut each: Vec<Vec<u8>> = bytes.split_inclusive(|b| *b == b'\n').map(<[u8]>::to_vec).collect();
     let middle = each[line].len() / 2;
