@@ -4,7 +4,7 @@
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use vice_run::leftovers;
+use vice_run::files::leftovers;
 
 use crate::terminal::Verbosity;
 

@@ -60,7 +60,6 @@ pub mod tracking_summary;
 pub mod trajectory;
 
 pub use evaluation::{Samples, evaluate_request};
-pub use vice_files::leftovers;
 pub use progress::{Progress, silent};
 
 /// The method.

@@ -4,7 +4,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use vice_core::camera::Camera;
-use vice_core::dataset::{Calibrated, CloudRef, CloudSource, Dataset, Floor, OpenOptions, Plane};
+use vice_core::dataset::{
+    Calibrated, CloudRef, CloudSource, Dataset, Floor, GROUND_TRUTH, OpenOptions, Plane,
+};
 use vice_core::error::{DataError, ErrorKind};
 use vice_core::evaluate::{DatasetRig, Observations};
 use vice_core::frames::{Rigid, World};
@@ -21,7 +23,7 @@ use crate::error::{RunError, RunResult};
 use crate::formats;
 use crate::in_memory::InMemory;
 use crate::place::Place;
-use crate::request::{DatasetSpec, Protocol};
+use crate::request::{DatasetSpec, EstimateSpec, Protocol, ReferenceSpec, Request, points_asked};
 use crate::scans::Scans;
 
 /// A recording as it is used.
@@ -263,6 +265,39 @@ fn describable(error: DataError, path: &Path) -> DataError {
             error.hint(hint)
         }
         _ => error,
+    }
+}
+
+impl Request {
+    /// The same, where what is not named is what the data set says: labels of its `vice.toml`, and all its streams but the
+    /// reference as estimates.
+    ///
+    /// # Errors
+    /// [`RunError`] of the kind usage if no labels are named anywhere.
+    pub fn completed(mut self, opened: &Opened) -> RunResult<Self> {
+        if self.labels.file.as_os_str().is_empty() {
+            let told = opened.told.as_ref().map(|told| &told.file.labels);
+            let Some((file, points)) = told.and_then(|l| Some((l.file.clone()?, &l.points))) else {
+                return Err(RunError::usage("labels", "no file of labels is named").advise(
+                    "name one, or `auto`; or write it into the data set's vice.toml: [labels] file",
+                ));
+            };
+            self.labels.file = file;
+            if self.labels.points.is_empty() {
+                self.labels.points.clone_from(points);
+            }
+            points_asked(&self.labels.file)?;
+        }
+        if self.streams.estimates.is_empty() {
+            let reference = match &self.streams.reference {
+                ReferenceSpec::Default => Some(GROUND_TRUTH.to_string()),
+                ReferenceSpec::None => None,
+                ReferenceSpec::Named(spec) => Some(spec.to_string()),
+            };
+            let others = opened.dataset.streams().into_iter().filter(|name| Some(name) != reference.as_ref());
+            self.streams.estimates = others.map(EstimateSpec::from).collect();
+        }
+        Ok(self)
     }
 }
 

@@ -132,3 +132,35 @@ fn every_layout_conforms() {
         assert!(good && said.is_empty(), "{}: {said:#?}", path.display());
     }
 }
+
+/// Five real frames in TUM's layout, read as they lie, against NumPy's projection of OpenCV's labels.
+#[test]
+fn real_frames_in_the_layout_of_tum_give_the_oracles_number() {
+    let (Some(run), Some(oracle)) =
+        (vice_tests::shared("data/tum_rgbd5"), vice_tests::shared_json("oracle/tum_rgbd5_vice.json"))
+    else {
+        return;
+    };
+    let (run, labels) = (run.to_str().unwrap().to_string(), run.join("labels.csv"));
+    let labels = labels.to_str().unwrap();
+    let said = vice_tests::vice(&[
+        "evaluate",
+        &run,
+        "--labels",
+        labels,
+        "--depth",
+        "zcam",
+        "--subsets",
+        "1,2,3,4",
+        "--json",
+        "-",
+    ]);
+    assert_eq!(said.code, 0, "{}", said.stderr);
+    let document: Value = serde_json::from_str(&said.stdout).unwrap();
+    for points in ["1", "2", "3", "4"] {
+        let found = document["pixel"][0]["rmse_px"][points]["mean"].as_f64();
+        let found = found.or(document["pixel"][0]["rmse_px"][points]["mean_px"].as_f64()).unwrap();
+        let expected = oracle["rmse_2d"][points]["mean_px"].as_f64().unwrap();
+        assert!((found - expected).abs() < 1e-4, "{points}: {found}, the oracle has {expected}");
+    }
+}

@@ -17,7 +17,6 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use vice_core::conventions::Convention;
-use vice_core::dataset::GROUND_TRUTH;
 pub use vice_core::evaluate::DEFAULT_MAX_GAP;
 use vice_core::evaluate::{Observations, Window};
 use vice_core::metrics::align::Alignment;
@@ -35,7 +34,6 @@ pub(crate) use word::{seconds, seconds_option};
 
 use crate::error::{RunError, RunResult};
 use crate::in_memory::is_in_memory;
-use crate::open::Opened;
 
 /// Everything that says what is evaluated, and how.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -317,37 +315,6 @@ impl Request {
             streams: StreamsSpec { estimates: estimates.into_iter().collect(), ..StreamsSpec::default() },
             ..Self::default()
         }
-    }
-
-    /// The same, where what is not named is what the data set says: labels of its `vice.toml`, and all its streams but the
-    /// reference as estimates.
-    ///
-    /// # Errors
-    /// [`RunError`] of the kind usage if no labels are named anywhere.
-    pub fn completed(mut self, opened: &Opened) -> RunResult<Self> {
-        if self.labels.file.as_os_str().is_empty() {
-            let told = opened.told.as_ref().map(|told| &told.file.labels);
-            let Some((file, points)) = told.and_then(|l| Some((l.file.clone()?, &l.points))) else {
-                return Err(RunError::usage("labels", "no file of labels is named").advise(
-                    "name one, or `auto`; or write it into the data set's vice.toml: [labels] file",
-                ));
-            };
-            self.labels.file = file;
-            if self.labels.points.is_empty() {
-                self.labels.points.clone_from(points);
-            }
-            points_asked(&self.labels.file)?;
-        }
-        if self.streams.estimates.is_empty() {
-            let reference = match &self.streams.reference {
-                ReferenceSpec::Default => Some(GROUND_TRUTH.to_string()),
-                ReferenceSpec::None => None,
-                ReferenceSpec::Named(spec) => Some(spec.to_string()),
-            };
-            let others = opened.dataset.streams().into_iter().filter(|name| Some(name) != reference.as_ref());
-            self.streams.estimates = others.map(EstimateSpec::from).collect();
-        }
-        Ok(self)
     }
 
     /// The command line of `vice evaluate` that asks for the same.
