@@ -45,8 +45,20 @@ pub(crate) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     values.try_into().map_err(|_| format!("{N} numbers separated by commas are expected, got {got}"))
 }
 
+/// Any number of numbers, in one value of an option.
+#[derive(Clone, Debug)]
+pub(crate) struct Numbers(pub(crate) Vec<f64>);
+
+impl std::str::FromStr for Numbers {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        numbers_any(text).map(Self)
+    }
+}
+
 /// Numbers separated by commas.
-pub(crate) fn numbers_any(text: &str) -> Result<Vec<f64>, String> {
+fn numbers_any(text: &str) -> Result<Vec<f64>, String> {
     let values: Vec<f64> = text
         .split(',')
         .map(|part| part.trim().parse::<f64>().map_err(|e| format!("`{part}`: {e}")))

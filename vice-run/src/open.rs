@@ -46,6 +46,7 @@ pub struct Opened {
     /// Poses and labels that a request may name though no file holds them.
     pub in_memory: InMemory,
     /// Files that were fetched from elsewhere, kept as long as they may be read.
+    #[expect(dead_code, reason = "held, so that the files are not removed")]
     staged: Arc<Vec<Place<'static>>>,
 }
 

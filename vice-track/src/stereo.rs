@@ -35,6 +35,9 @@ const UNSURE: f64 = 0.01;
 /// A depth less sure than this part of it is none.
 const USELESS: f64 = 0.2;
 
+/// More pixels than this are a whole image: each is looked for along its own line, which takes milliseconds.
+const MOST_PIXELS: usize = 10_000;
+
 /// Nearer cameras than this are no pair, metres.
 const LEAST_BASELINE_M: f64 = 1e-3;
 
@@ -114,6 +117,13 @@ impl DepthSource for StereoDepth {
         keyframe: &Keyframe<'_>,
         pixels: &[Pixel],
     ) -> DataResult<Vec<Result<DepthSample, DepthMiss>>> {
+        if pixels.len() > MOST_PIXELS {
+            return Err(DataError::of_kind(
+                ErrorKind::Unsupported,
+                format!("the depth source stereo is of single points, and {} pixels are asked", pixels.len()),
+            )
+            .hint("`vice depth compare --source zmap,stereo` shows it at labelled points"));
+        }
         let Some(index) = self.beside(keyframe.stamp) else {
             *self.alone.lock().unwrap_or_else(PoisonError::into_inner) += 1;
             return Ok(vec![Err(DepthMiss::NoMatch); pixels.len()]);

@@ -43,6 +43,7 @@ mod report;
 mod report_compare;
 mod report_overlay;
 mod samples;
+mod scans;
 mod synthetic;
 mod tracker_oracle;
 mod trajectory_many;

@@ -9,7 +9,7 @@ use vice_run::request::{DatasetSpec, DepthSpec, ReferenceSpec, ZMapInterpolation
 
 use vice_run::request::{ImageSize, LensSpec};
 
-use super::{DatasetArgs, numbers, numbers_any, positive, span_not_negative, split_list};
+use super::{DatasetArgs, Numbers, numbers, positive, span_not_negative, split_list};
 use crate::terminal::usage;
 
 /// A calibration in place of the data set's.
@@ -30,8 +30,8 @@ pub(crate) struct CalibrationArgs {
     #[arg(long, value_name = "WxH")]
     image_size: Option<ImageSize>,
     /// The camera's place in the body: x,y,z in metres and the quaternion, or a matrix row by row.
-    #[arg(long, value_name = "X,Y,Z,QX,QY,QZ,QW", allow_hyphen_values = true, value_parser = numbers_any)]
-    body_from_camera: Option<Vec<f64>>,
+    #[arg(long, value_name = "X,Y,Z,QX,QY,QZ,QW", allow_hyphen_values = true)]
+    body_from_camera: Option<Numbers>,
 }
 
 /// How depth sources work, and the calibration.
@@ -144,7 +144,7 @@ impl CalibrationArgs {
             intrinsics: self.intrinsics,
             distortion: self.distortion.clone(),
             image_size: self.image_size,
-            body_from_camera: self.body_from_camera.clone(),
+            body_from_camera: self.body_from_camera.as_ref().map(|numbers| numbers.0.clone()),
             ..dataset.spec()
         }
     }

@@ -5,7 +5,7 @@ use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::frames::BodyFromCamera;
 use vice_core::time::Span;
 
-use super::dialects::{Entry, in_camera_kind, list, one, side};
+use super::entry::{Entry, in_camera_kind, list, one, side};
 
 /// Keys that say nothing about a camera's geometry.
 const HARMLESS: [&str; 12] = [

@@ -4,7 +4,7 @@
 
 use vice_core::error::{DataError, DataResult, ErrorKind};
 
-use super::dialects::in_camera_kind;
+use super::entry::in_camera_kind;
 use super::{CalibrationFile, CameraOverride};
 
 /// A model of COLMAP: name, how many parameters it has, and where each goes.

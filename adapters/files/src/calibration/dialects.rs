@@ -6,6 +6,7 @@ use vice_core::frames::{Body, BodyFromCamera, Camera, Rigid, rotation_angle_rad}
 use vice_core::suspicion::Suspicion;
 use vice_core::time::Span;
 
+use super::entry::{Entry, in_camera_kind, list, one, side};
 use super::keys::{self, Key};
 use super::lens::{self, Numbers};
 use super::{CalibrationFile, CameraOverride, basalt, in_camera, tree};
@@ -13,17 +14,6 @@ use crate::rigid_file::Matrix4;
 
 /// How far two statements of the same transform may be apart: metres and radians.
 const SAME_TRANSFORM: f64 = 1e-3;
-
-/// A camera as far as its entry says.
-#[derive(Default)]
-pub(super) struct Entry {
-    pub(super) camera: CameraOverride,
-    camera_from_previous: Option<Rigid<Camera, Camera>>,
-    pub(super) time_shift: Option<Span>,
-    topic: Option<String>,
-    name: Option<String>,
-    pub(super) unused: Vec<String>,
-}
 
 pub(super) fn parse(text: &str) -> DataResult<CalibrationFile> {
     let root = tree::read(text)?;
@@ -156,21 +146,6 @@ fn weighty(key: &str) -> DataError {
     .hint("take it out if it does not matter; extrinsics are read as T_cam_imu, T_imu_cam, T_BS or T_cn_cnm1")
 }
 
-pub(super) fn in_camera_kind(name: &str, error: &DataError) -> DataError {
-    DataError::of_kind(error.kind(), format!("[{name}]: {}", error.problem()))
-}
-
-pub(super) fn list(key: &str, value: &Value) -> DataResult<Vec<f64>> {
-    tree::numbers(value)
-        .ok_or_else(|| DataError::new(format!("is not the YAML expected: {key} is no list of numbers")))
-}
-
-pub(super) fn one(key: &str, value: &Value) -> DataResult<f64> {
-    tree::number(value)
-        .filter(|v| v.is_finite())
-        .ok_or_else(|| DataError::new(format!("is not the YAML expected: {key} is no number")))
-}
-
 fn transform<A, B>(key: &str, value: &Value) -> DataResult<Rigid<A, B>> {
     if let Value::Object(map) = value
         && !map.contains_key("data")
@@ -184,15 +159,6 @@ fn transform<A, B>(key: &str, value: &Value) -> DataResult<Rigid<A, B>> {
         _ => Matrix4::Flat(list(key, value)?),
     };
     matrix.to_rigid(key)
-}
-
-/// Sides of an image.
-pub(super) fn side(key: &str, value: f64) -> DataResult<u32> {
-    if value.fract() == 0.0 && (0.0..f64::from(u32::MAX)).contains(&value) {
-        Ok(value as u32)
-    } else {
-        Err(DataError::new(format!("{key} = {value} is no number of pixels")))
-    }
 }
 
 fn intrinsics_of_matrix(key: &str, value: &Value) -> DataResult<[f64; 4]> {

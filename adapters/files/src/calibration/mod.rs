@@ -20,6 +20,7 @@
 mod basalt;
 mod colmap;
 mod dialects;
+mod entry;
 mod keys;
 mod lens;
 mod toml_file;
