@@ -233,13 +233,13 @@ test("keys can be changed, and stay changed", async () => {
   await first.press("?");
   const button = page.getByRole("button", { name: /^Change the key of "Next frame"/ });
   await button.click();
-  await first.press("x");
-  await page.getByText("X is set.").waitFor();
+  await first.press("q");
+  await page.getByText("Q is set.").waitFor();
   await first.screenshot("5-help");
   await first.press("Escape");
   await page.reload();
   await first.shows(0);
-  await first.press("x");
+  await first.press("q");
   await first.shows(1);
   await first.press("?");
   await page.getByRole("button", { name: "Default keys" }).click();

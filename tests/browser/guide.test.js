@@ -102,7 +102,6 @@ test("a point has its name before it is placed, and keeps it", async () => {
   await page.mouse.click(x, y);
   await server.until("the door is there", ({ points }) => points.some(({ name }) => name === "door"));
   await page.mouse.move(5, 5);
-  await window.press("n");
   await page.locator("#banners [data-id=task]").getByText("Point door has not been tracked from here yet").waitFor();
   await window.screenshot("guide-4-untracked");
   await page.getByRole("button", { name: "Remove point door" }).click();

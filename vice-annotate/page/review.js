@@ -26,7 +26,7 @@ class Review {
     this.images = new Images(IMAGE_BUDGET_BYTES);
     this.view = new View();
     this.view.setImage(state.width, state.height);
-    this.at = 0;
+    this.at = -1;
     this.busy = false;
     /** @type {{x: number, y: number, moved: boolean} | null} */
     this.press = null;
@@ -65,10 +65,8 @@ class Review {
     const { samples } = this.state;
     const open = samples.findIndex(({ verdict }, at) => !verdict && at > this.at);
     const first = open < 0 ? samples.findIndex(({ verdict }) => !verdict) : open;
-    if (first >= 0) {
-      this.at = first;
-      this.view.fit();
-    }
+    this.at = first >= 0 ? first : Math.max(0, this.at);
+    if (first >= 0) this.view.fit();
     this.show();
   }
 

@@ -49,8 +49,6 @@ pub(crate) struct Match {
     pub(crate) warp: Warp,
     /// Weighted correlation of template and image, 1 at best.
     pub(crate) correlation: f64,
-    /// How far off the place may be for what template and image differ by, if that were white noise: standard deviation, pixels.
-    pub(crate) spread_px: f64,
 }
 
 /// Why there is no match.
@@ -174,16 +172,6 @@ impl Template {
         }
         let seen = self.seen(level, &warp)?;
         let correlation = self.values.iter().zip(&seen).zip(&self.weights).map(|((a, b), w)| a * b * w).sum();
-        Ok(Match { warp, correlation, spread_px: self.spread_px(&warp, correlation) })
-    }
-
-    /// The covariance of a least-squares fit: the mean square of what is left, by the inverse of the Hessian. Noise of the image
-    /// makes it grow, and so does texture that is weak or runs one way.
-    fn spread_px(&self, warp: &Warp, correlation: f64) -> f64 {
-        let total: f64 = self.weights.iter().sum();
-        // Of two vectors of length one; weights are taken as shares of a sample.
-        let noise = 2.0 * (1.0 - correlation).max(0.0) / total;
-        let shift = self.inverse_hessian.fixed_view::<2, 2>(0, 0) * noise;
-        (warp.linear * shift * warp.linear.transpose()).trace().max(0.0).sqrt()
+        Ok(Match { warp, correlation })
     }
 }

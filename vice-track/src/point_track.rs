@@ -70,9 +70,6 @@ pub struct Step {
     pub px: Pixel,
     /// 0 to 1; under [`DOUBT_CONFIDENCE`] it is doubtful. 0 if it was not found.
     pub confidence: f64,
-    /// How far off it may be for what its looks differ from those at its start by, pixels: the standard deviation that noise of the
-    /// image would make with this texture. 0 if it was not found.
-    pub spread_px: f64,
     /// What became of it.
     pub outcome: Outcome,
 }
@@ -140,7 +137,7 @@ impl PointTrack {
     }
 
     fn nothing(&self, outcome: Outcome) -> Step {
-        Step { px: self.warp.at, confidence: 0.0, spread_px: 0.0, outcome }
+        Step { px: self.warp.at, confidence: 0.0, outcome }
     }
 
     fn search(&mut self, next: &Arc<Pyramid>, seed: Option<Pixel>) -> Step {
@@ -167,7 +164,7 @@ impl PointTrack {
             return self.nothing(Outcome::LeftImage);
         }
         let found = self.template.find(next.base(), Warp { at: flow, ..self.warp });
-        let Match { warp, correlation, spread_px } = match found {
+        let Match { warp, correlation } = match found {
             Ok(found) => found,
             Err(NoMatch::Outside) => return self.nothing(Outcome::LeftImage),
             Err(NoMatch::Lost) => return self.nothing(Outcome::Lost),
@@ -193,7 +190,7 @@ impl PointTrack {
             self.refreshes += 1;
             outcome = Outcome::Refreshed;
         }
-        Step { px: warp.at, confidence, spread_px, outcome }
+        Step { px: warp.at, confidence, outcome }
     }
 }
 

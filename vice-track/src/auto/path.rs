@@ -30,10 +30,6 @@ pub(super) struct Seen {
     pub(super) confidence: f32,
     /// How far off the way back ended, of the block of frames that it was followed through; NaN where none was gone.
     pub(super) back_px: f32,
-    /// How far off it may be for the noise of the image and its texture, pixels.
-    pub(super) spread_px: f32,
-    /// How often its looks were taken anew up to here.
-    pub(super) refreshes: u16,
 }
 
 /// Of places for which everything speaks so many are further off than a pixel, and of those for which nothing does.

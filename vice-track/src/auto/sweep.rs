@@ -229,7 +229,7 @@ impl Runner {
         given: Option<(usize, usize)>,
     ) -> Option<Self> {
         let track = PointTrack::start(picture, px, TrackOptions::default()).ok()?;
-        let seen = vec![Some(Seen { px, confidence: 1.0, back_px: f32::NAN, spread_px: 0.0, refreshes: 0 })];
+        let seen = vec![Some(Seen { px, confidence: 1.0, back_px: f32::NAN })];
         let path = Path { start: position, seen, end: End::Open, given, fit: Vec::new() };
         Some(Self { path, track: Some(track), until })
     }
@@ -259,14 +259,7 @@ impl Runner {
                 break;
             }
             let confidence = step.confidence as f32;
-            let (spread_px, refreshes) = (step.spread_px as f32, track.refreshes() as u16);
-            self.path.seen.push(Some(Seen {
-                px: step.px,
-                confidence,
-                back_px: f32::NAN,
-                spread_px,
-                refreshes,
-            }));
+            self.path.seen.push(Some(Seen { px: step.px, confidence, back_px: f32::NAN }));
         }
         self.return_to(entry, from, pictures);
     }
