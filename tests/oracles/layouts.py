@@ -284,7 +284,8 @@ def kitti_raw():
     import pykitti
 
     day, drive = "2011_09_26", "2011_09_26_drive_0001_sync"
-    p = {c: np.array([[721.5377, 0, 609.5593, t], [0, 721.5377, 172.854, 0.2], [0, 0, 1, 0.0027]]) for c, t in (("00", 0.0), ("02", 44.85728), ("01", -387.5744), ("03", -339.5242))}
+    # pykitti takes the baseline's x only: what a real file has beside it is some 0.2 mm, and is left out here.
+    p = {c: np.array([[721.5377, 0, 609.5593, t], [0, 721.5377, 172.854, 0.0], [0, 0, 1, 0.0]]) for c, t in (("00", 0.0), ("02", 44.85728), ("01", -387.5744), ("03", -339.5242))}
     p["00"][:, 3] = 0
     r_rect = Rotation.from_rotvec([0.004, 0.01, -0.007]).as_matrix()
     r_velo = Rotation.from_rotvec([0.01, -0.01, 0.012]).as_matrix() @ LEVEL.T

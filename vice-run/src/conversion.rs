@@ -106,7 +106,7 @@ fn integrated(dataset: &dyn Dataset, camera: Option<&str>) -> RunResult<Trajecto
     let (start, end) = (reference.trajectory.start(), reference.trajectory.end());
     let covered = || frames.iter().copied().filter(|s| (start..=end).contains(s));
     // Velocity is fitted to poses on both sides, so that the very first frame may have none.
-    let last = covered().last();
+    let last = covered().next_back();
     let start = |first: Stamp| {
         let start =
             ImuStart { dataset, reference: &reference, time_offset: Span::ZERO, max_gap: DEFAULT_MAX_GAP };

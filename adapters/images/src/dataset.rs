@@ -122,7 +122,9 @@ impl Folder {
         let image = image_file::decode_depth_png(&bytes, depth.stamps[nearest], part.metres_per_count);
         let image = without(image.map_err(|e| e.at(path))?, part);
         let (width, height) = (image.width(), image.height());
-        let size = self.camera(camera).ok().map(|c| (c.width(), c.height()));
+        // A folder whose calibration stands outside of it has pictures all the same.
+        let known = self.camera(camera).ok().map(|c| (c.width(), c.height()));
+        let size = known.or_else(|| self.first_picture(camera).map(|(_, size)| size));
         if let Some((w, h)) = size.filter(|size| *size != (width, height)) {
             return Err(DataError::of_kind(
                 ErrorKind::Contradictory,

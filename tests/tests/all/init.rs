@@ -206,6 +206,7 @@ fn mistakes_of_a_folder_are_one_line_each() {
     fs::write(folder.join("times.txt"), rows).unwrap();
     let run = vice(&["info", text(folder)]);
     assert!(run.stderr.contains("times.txt:8: ") && run.stderr.contains("appears twice"), "{}", run.stderr);
+    fs::remove_file(folder.join("times.txt")).unwrap();
     // A depth image of another size.
     fs::create_dir_all(folder.join("depth")).unwrap();
     let depth =

@@ -63,7 +63,7 @@ pub(super) fn cameras(path: &Path) -> DataResult<BTreeMap<u32, ModelCamera>> {
         let model = by_name(&field::<String>(fields, "MODEL")?)?;
         let size = [field(fields, "WIDTH")?, field(fields, "HEIGHT")?];
         let mut parameters = Vec::new();
-        while let Some(text) = fields.next() {
+        for text in fields.by_ref() {
             parameters.push(number(&mut std::iter::once(text), "a parameter")?);
         }
         match found.insert(id, ModelCamera::new(model, size, parameters)?) {
