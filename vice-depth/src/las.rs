@@ -63,7 +63,6 @@ fn checked<T>(place: &str, decode: impl FnOnce() -> las::Result<T>) -> DataResul
 mod tests {
     use las::{Builder, Point, Transform, Vector, Writer};
 
-    use super::*;
     use crate::cloud::{CloudOptions, read_scan_points};
 
     /// A file of points that a map has, written by the crate itself.
