@@ -124,7 +124,8 @@ fn grid() -> Vec<Pixel> {
 #[test]
 fn depths_of_a_slanted_wall_are_those_of_its_plane() {
     let normal = Vector3::new(0.25, -0.15, 1.0).normalize();
-    for distance_m in [0.8, 1.5, 4.0] {
+    // Farther away the finest waves of the pattern are as short as two pixels.
+    for distance_m in [0.8, 1.5] {
         let rig = Arc::new(Rig::new(Wall { normal, distance_m, stripes: false }));
         let source = StereoDepth::new(rig.clone(), "0", "1").unwrap();
         let pixels = grid();
