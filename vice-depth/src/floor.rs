@@ -178,7 +178,7 @@ mod tests {
     fn an_unknown_floor_is_refused_unless_a_plane_is_given() {
         let camera = Intrinsics::new(640, 480, [400.0, 400.0, 320.0, 240.0], Model::Pinhole).unwrap();
         let keyframe = Keyframe {
-            stamp: vice_core::time::Stamp::default(),
+            stamp: Stamp::default(),
             frame: 0,
             camera: &camera,
             body_from_camera: Rigid::identity(),

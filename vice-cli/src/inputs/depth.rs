@@ -111,7 +111,7 @@ impl DepthArgs {
             .iter()
             .map(|name| name.parse().map_err(|e| usage(format!("{option}: {e}"))))
             .collect::<anyhow::Result<_>>()?;
-        Ok(DepthSpec {
+        let spec = DepthSpec {
             sources,
             zmap_occlusion: self.zmap_occlusion,
             zmap_interpolation: self.zmap_interpolation,
@@ -121,7 +121,9 @@ impl DepthArgs {
             tag_family: self.tag_family,
             stereo_camera: self.stereo_camera.clone(),
             compare: None,
-        })
+        };
+        spec.check_scene(&DatasetSpec { mesh: self.mesh.clone(), ..DatasetSpec::default() })?;
+        Ok(spec)
     }
 
     /// The data set with what overrides it.
