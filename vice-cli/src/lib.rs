@@ -19,6 +19,7 @@ use clap::{CommandFactory, Parser};
 use arguments::{Cli, Command};
 pub use itself::Itself;
 use terminal::Outcome;
+use vice_run::core::instructions::Instructions;
 
 /// Names of the program's commands, in the order of its help.
 pub fn commands() -> Vec<String> {
@@ -38,6 +39,11 @@ pub fn main_from(args: impl IntoIterator<Item = OsString>, itself: Itself) -> u8
     };
     let verbosity = terminal::Verbosity::new(cli.quiet, cli.verbose);
     terminal::show_warnings(verbosity);
+    if let Err(wrong) = Instructions::from_environment() {
+        let error = terminal::usage(wrong);
+        terminal::print_error(&error);
+        return terminal::exit_code(&error);
+    }
     // The annotator ends by itself, with all labels saved.
     if !matches!(cli.command, Command::Annotate(_)) {
         signals::listen();

@@ -30,6 +30,7 @@ pub mod finding;
 pub mod fleet;
 pub mod frames;
 pub mod imu;
+pub mod instructions;
 pub mod label;
 pub mod lanes;
 pub mod metrics;

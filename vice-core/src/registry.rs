@@ -54,6 +54,10 @@ impl Registry {
             .map(|f| (f.as_ref(), f.probe(path)))
             .filter(|(_, probe)| *probe != Probe::No)
             .collect();
+        // A format of this very robot knows better than one of folders in general.
+        if claims.iter().any(|(f, _)| !f.is_general()) {
+            claims.retain(|(f, _)| !f.is_general());
+        }
         // A folder that is a data set is opened as one, also where data sets of another format lie below it.
         if claims.iter().filter(|(_, probe)| *probe == Probe::Yes).count() == 1 {
             claims.retain(|(_, probe)| *probe == Probe::Yes);
@@ -136,6 +140,10 @@ mod tests {
                 settings: vec![],
             }
         }
+        fn is_general(&self) -> bool {
+            self.0 == "general"
+        }
+
         fn probe(&self, _: &Path) -> Probe {
             self.1.clone()
         }
@@ -170,6 +178,9 @@ mod tests {
             open(vec![Claims("a", Probe::Yes), below(), Claims("c", Probe::Yes)], None, &none)
                 .contains("more than")
         );
+        assert_eq!(open(vec![Claims("general", Probe::Yes)], None, &none), "opened by general");
+        let robot = || Claims("robot", Probe::Yes);
+        assert_eq!(open(vec![Claims("general", Probe::Yes), robot()], None, &none), "opened by robot");
         let set = OpenOptions { settings: [("k".to_string(), "v".to_string())].into() };
         assert!(open(two(), Some("a"), &set).contains("no setting `k`"));
         let gone = Registry::new().detect(Path::new("no/such")).err().unwrap();

@@ -30,6 +30,7 @@ mod lookalike;
 mod lucas_kanade;
 mod point_track;
 mod pyramid;
+mod registers;
 mod sampler;
 pub mod stereo;
 mod suggest;

@@ -2,10 +2,11 @@
 //! "Pyramidal implementation of the Lucas Kanade feature tracker", 2000, with the constants of OpenCV's
 //! `calcOpticalFlowPyrLK`: 21x21, thirty steps, a hundredth of a pixel.
 
-use fearless_simd::{Level as SimdLevel, Simd, dispatch};
+use fearless_simd::{Simd, dispatch};
 use vice_core::camera::Pixel;
 
 use crate::pyramid::{Level, Pyramid, WINDOW_PX};
+use crate::registers;
 use crate::window::{Corner, Patch, Region};
 
 const MAX_STEPS: usize = 30;
@@ -24,13 +25,13 @@ const EIGENVALUE_UNIT: f32 = 1.0 / 1024.0;
 /// OpenCV's `calcOpticalFlowPyrLK` with its default arguments, over as many levels as both pyramids have.
 pub fn track_translation(prev: &Pyramid, next: &Pyramid, points: &[Pixel]) -> Vec<Option<Pixel>> {
     let mut found = Vec::with_capacity(points.len());
-    dispatch!(SimdLevel::new(), simd => track_all(simd, prev, next, points, &mut found));
+    dispatch!(registers::level(), simd => track_all(simd, prev, next, points, &mut found));
     found
 }
 
 /// The same for one point whose place in the next frame is supposed to be near `start`.
 pub(crate) fn track_one(prev: &Pyramid, next: &Pyramid, from: Pixel, start: Pixel) -> Option<Pixel> {
-    dispatch!(SimdLevel::new(), simd => simd.vectorize(
+    dispatch!(registers::level(), simd => simd.vectorize(
         #[inline(always)]
         || Search::new().track(simd, prev, next, from, start)
     ))

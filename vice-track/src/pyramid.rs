@@ -1,8 +1,10 @@
 //! An image and its halvings.
 
-use fearless_simd::{Level as SimdLevel, Simd, dispatch};
+use fearless_simd::{Simd, dispatch};
 use vice_core::dataset::{Image, PixelFormat};
 use vice_core::error::{DataError, DataResult};
+
+use crate::registers;
 
 /// Columns and rows of the window that is matched.
 pub const WINDOW_PX: usize = 21;
@@ -33,7 +35,7 @@ impl Pyramid {
         if width == 0 || height == 0 {
             return Err(DataError::new(format!("an image of {width}x{height} pixels cannot be tracked")));
         }
-        let simd = SimdLevel::new();
+        let simd = registers::level();
         let pixels = match image.format() {
             PixelFormat::Gray8 => image.data().to_vec(),
             PixelFormat::Rgb8 => dispatch!(simd, simd => simd.vectorize(|| luma(image.data()))),

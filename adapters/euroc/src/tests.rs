@@ -154,8 +154,15 @@ fn a_bad_calibration_is_named() {
     let good = format!("T_BS: {{rows: 4, cols: 4, data: {IDENTITY}}}\nresolution: [4, 2]\n");
     says(&format!("{good}intrinsics: [-3, 3, 1, 1]\n"), "focal length fx = -3");
     says(&format!("{good}intrinsics: [3, 3, 1]\n"), "is not the YAML expected");
-    says(&format!("{good}intrinsics: [3, 3, 1, 1]\ncamera_model: omni\n"), "unknown camera_model `omni`");
-    says(&format!("{good}intrinsics: [3, 3, 1, 1]\ndistortion_model: fov\n"), "unknown camera model `fov`");
+    says(&format!("{good}intrinsics: [3, 3, 1, 1]\ncamera_model: mirror\n"), "unknown camera_model `mirror`");
+    says(
+        &format!("{good}intrinsics: [3, 3, 1, 1]\ncamera_model: omni\n"),
+        "xi, fx, fy, cx, cy: 5 numbers, not 4",
+    );
+    says(
+        &format!("{good}intrinsics: [3, 3, 1, 1]\ndistortion_model: mirror\n"),
+        "unknown camera model `mirror`",
+    );
     says(
         &format!("{good}intrinsics: [3, 3, 1, 1]\ndistortion_model: radtan\ndistortion_coefficients: [1]\n"),
         "takes 4 or 5",

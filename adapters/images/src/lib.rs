@@ -73,6 +73,10 @@ impl DatasetFactory for Images {
         if inside.is_empty() { Probe::No } else { Probe::Collection(inside) }
     }
 
+    fn is_general(&self) -> bool {
+        true
+    }
+
     fn open(&self, path: &Path, options: &OpenOptions) -> DataResult<Box<dyn Dataset>> {
         let layout = layout_of(path).ok_or_else(|| {
             DataError::of_kind(ErrorKind::Unsupported, "is no folder of images in a layout that is known")

@@ -455,11 +455,12 @@ fn a_full_disk_refuses_the_edit_and_loses_nothing() {
     // Files may have 16 blocks of 512 bytes (or 1024, by the shell); without the trap the signal would end the program.
     let annotator = Annotator::start_limited(&run.args(&[]), "trap '' XFSZ; ulimit -f 16");
     let mut revision = 0;
-    let refused = loop {
+    let (refused, edit) = loop {
         let frame = revision as usize % FRAMES;
-        let answer = annotator.edit(revision, &[place("1", frame, 5.0 + revision as f64 * 0.01, 6.0)]);
+        let edit = place("1", frame, 5.0 + revision as f64 * 0.01, 6.0);
+        let answer = annotator.edit(revision, std::slice::from_ref(&edit));
         if answer.status != 200 {
-            break answer;
+            break (answer, edit);
         }
         revision += 1;
         assert!(revision < 1000, "the limit does not hold");
@@ -467,7 +468,7 @@ fn a_full_disk_refuses_the_edit_and_loses_nothing() {
     bad(&refused, 507, "journal");
     let state = annotator.state();
     assert_eq!(state["revision"], revision);
-    bad(&annotator.edit(revision, &[place("2", 0, 5.0, 5.0)]), 507, "not made");
+    bad(&annotator.edit(revision, &[edit]), 507, "not made");
     assert_eq!(annotator.get("/api/frames/0").status, 200);
     drop(annotator);
     let after = run.open().state();

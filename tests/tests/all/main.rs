@@ -28,6 +28,7 @@ mod evaluate_oracle;
 mod fleet;
 mod fleet_cluster;
 mod init;
+mod instructions;
 mod interrupted;
 mod labels_track;
 mod layouts_oracle;

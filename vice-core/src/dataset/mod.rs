@@ -170,6 +170,12 @@ pub trait DatasetFactory: Send + Sync {
     /// Whether a path looks like this format. Cheap: looks at names and first bytes, never at a whole file.
     fn probe(&self, path: &Path) -> Probe;
 
+    /// Whether it reads layouts that many programs write: it yields to any other format that claims the same path, such
+    /// as a plugin for one's own robot.
+    fn is_general(&self) -> bool {
+        false
+    }
+
     /// Opens a data set.
     ///
     /// # Errors

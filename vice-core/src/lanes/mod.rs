@@ -23,8 +23,15 @@ use std::sync::LazyLock;
 
 use pulp::{Arch, Simd, WithSimd};
 
+use crate::instructions::Instructions;
+
 /// Found once: asking the processor for each batch would cost more than a small batch does.
-pub(crate) static ARCH: LazyLock<Arch> = LazyLock::new(Arch::new);
+pub(crate) static ARCH: LazyLock<Arch> = LazyLock::new(|| match Instructions::in_use() {
+    Instructions::Scalar => Arch::Scalar,
+    #[cfg(target_arch = "x86_64")]
+    Instructions::V3 => pulp::x86::V3::try_new().map_or(Arch::Scalar, Arch::V3),
+    _ => Arch::new(),
+});
 
 /// The instruction set that batches run with, and how many doubles it works on at a time, such as `V4, 8 doubles`.
 ///

@@ -147,7 +147,7 @@ fn coordinates_that_are_not_there() {
     );
     let folder = tempfile::tempdir().unwrap();
     let error = read_points(folder.path(), &mut Points::default()).unwrap_err().to_string();
-    assert!(error.ends_with("is a folder, not a PLY file"), "{error}");
+    assert!(error.ends_with("is a folder, not a file of points"), "{error}");
     let error = read_points(&folder.path().join("gone.ply"), &mut Points::default()).unwrap_err().to_string();
     assert!(error.ends_with("gone.ply: cannot be opened"), "{error}");
 }

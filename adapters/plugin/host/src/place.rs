@@ -30,8 +30,43 @@ pub(crate) fn look(path: &Path) -> DataResult<Place> {
     }
     let mut place = Place { refusal: None, warning: None, path: real };
     #[cfg(unix)]
-    examine(&mut place, &file).map_err(unreadable)?;
+    {
+        examine(&mut place, &file).map_err(unreadable)?;
+        examine_links(&mut place, path).map_err(unreadable)?;
+    }
     Ok(place)
+}
+
+/// Links on the way: whoever can put another one in its place chooses what is loaded.
+#[cfg(unix)]
+fn examine_links(place: &mut Place, path: &Path) -> std::io::Result<()> {
+    use std::os::unix::fs::MetadataExt;
+    let me = rustix::process::geteuid().as_raw();
+    let mut at = path.to_path_buf();
+    // A file that was found by the system has fewer links than the system follows.
+    for _ in 0..40 {
+        let link = at.symlink_metadata()?;
+        if !link.is_symlink() {
+            return Ok(());
+        }
+        let folder = at.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder_data = folder.metadata()?;
+        let shown = at.display();
+        if link.uid() != me && link.uid() != 0 {
+            let reason = format!("the link {shown} belongs to another user (id {})", link.uid());
+            place.refusal.get_or_insert(reason);
+        }
+        // In a folder like /tmp (sticky) only its owner can replace a link.
+        if folder_data.mode() & 0o1002 == 0o0002 {
+            let reason = format!(
+                "the folder of the link {shown} may be written to by anyone (mode {:o})",
+                folder_data.mode() & 0o7777
+            );
+            place.refusal.get_or_insert(reason);
+        }
+        at = folder.join(std::fs::read_link(&at)?);
+    }
+    Ok(())
 }
 
 #[cfg(unix)]
@@ -90,6 +125,29 @@ mod tests {
         assert!(folder.refusal.unwrap().contains("its folder"));
         let group = with_modes(0o775, 0o755);
         assert!(group.refusal.is_none() && group.warning.unwrap().contains("group"));
+    }
+
+    #[test]
+    fn a_link_that_others_can_replace_is_refused() {
+        let [real, open] = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+        let file = real.path().join("lib.so");
+        std::fs::write(&file, "x").unwrap();
+        let (first, second) = (open.path().join("a.so"), real.path().join("b.so"));
+        std::os::unix::fs::symlink(&file, &first).unwrap();
+        std::os::unix::fs::symlink(&first, &second).unwrap();
+        let set =
+            |mode| std::fs::set_permissions(open.path(), std::fs::Permissions::from_mode(mode)).unwrap();
+        assert!(look(&second).unwrap().refusal.is_none());
+        set(0o777);
+        for link in [&first, &second] {
+            let refusal = look(link).unwrap().refusal.unwrap();
+            assert!(refusal.contains("folder of the link") && refusal.contains("a.so"), "{refusal}");
+        }
+        set(0o1777);
+        assert!(look(&first).unwrap().refusal.is_none(), "only the owner can replace it there");
+        if std::os::unix::fs::lchown(&first, Some(12345), None).is_ok() {
+            assert!(look(&second).unwrap().refusal.unwrap().contains("another user (id 12345)"));
+        }
     }
 
     #[test]

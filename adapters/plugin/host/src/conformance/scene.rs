@@ -79,6 +79,13 @@ impl Check<'_> {
             },
             Err(error) => self.fault(format!("scan: {}", one_line(&error))),
         }
+        match dataset.mesh().map(|mesh| mesh.map(|m| m.source)) {
+            Ok(Some(CloudSource::File(path))) if !path.is_file() => {
+                self.fault(format!("the faces {} are no file", path.display()));
+            }
+            Ok(_) => {}
+            Err(error) => self.fault(format!("faces: {}", one_line(&error))),
+        }
         self.step("floor");
         if let Some((first, _)) = lists.extent() {
             match dataset.floor(first) {
