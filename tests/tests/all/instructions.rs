@@ -39,7 +39,7 @@ fn results_have_the_same_bytes_with_any_instructions() {
             "--depth",
             "floor,zcam",
         ];
-        with(instructions, &[&evaluate[..], &["--json", "result.json", "--force", "-q"]].concat(), at);
+        with(instructions, &[&evaluate[..], &["--json", "result.json", "-q"]].concat(), at);
         let diagnose = [
             "diagnose",
             "flight",
@@ -50,7 +50,7 @@ fn results_have_the_same_bytes_with_any_instructions() {
             "--depth",
             "zcam",
         ];
-        let told = with(instructions, &[&diagnose[..], &["--json", "found.json", "--force"]].concat(), at);
+        let told = with(instructions, &[&diagnose[..], &["--json", "found.json"]].concat(), at);
         let all = vec![read("tracks.json"), read("result.json"), read("found.json"), told.into_bytes()];
         match &first {
             None => first = Some(all),

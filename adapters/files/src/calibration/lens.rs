@@ -98,7 +98,7 @@ impl Projection {
     }
 
     /// A list of intrinsics as Kalibr writes it: the projection's own parameters, then fx, fy, cx, cy.
-    pub(super) fn split(self, key: &str, values: &[f64]) -> DataResult<(Vec<(String, f64)>, [f64; 4])> {
+    pub(super) fn split(self, key: &str, values: &[f64]) -> DataResult<(Named, [f64; 4])> {
         let own = self.own();
         let split =
             values.split_at_checked(own.len()).and_then(|(first, rest)| Some((first, rest.try_into().ok()?)));
@@ -118,6 +118,9 @@ impl Projection {
         }
     }
 }
+
+/// Parameters with their names.
+pub(super) type Named = Vec<(String, f64)>;
 
 /// Puts the lens into the camera: its model by the names and numbers that were found.
 pub(super) fn settle(
