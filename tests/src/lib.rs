@@ -35,6 +35,11 @@ pub fn shared(relative: &str) -> Option<PathBuf> {
     None
 }
 
+/// Says why a part of a test is skipped.
+pub fn skipped(reason: &str) {
+    eprintln!("skipped: {reason}");
+}
+
 /// A JSON file of the shared data; see [`shared`].
 pub fn shared_json(relative: &str) -> Option<serde_json::Value> {
     let path = shared(relative)?;

@@ -37,10 +37,10 @@ impl Doorway {
                 return Err(std::io::Error::other("files beside the labels cannot be kept from other users"));
             }
         }
-        write!(
+        writeln!(
             file,
             "<!doctype html><meta charset=\"utf-8\"><meta name=\"referrer\" content=\"no-referrer\">\
-             <meta http-equiv=\"refresh\" content=\"0;url={url}\"><title>VICE</title><p><a href=\"{url}\">To the labels</a>\n"
+             <meta http-equiv=\"refresh\" content=\"0;url={url}\"><title>VICE</title><p><a href=\"{url}\">To the labels</a>"
         )?;
         file.flush()?;
         Ok(file)

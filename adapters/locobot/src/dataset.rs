@@ -33,6 +33,9 @@ use crate::sweeps::{self, Placed};
 use crate::tf::{TfTree, Transform, list};
 use crate::wire::Reader;
 
+/// Points of sweeps relative to a place, and that place; or why there are none.
+type Swept = Result<(Vector3<f64>, Arc<[Point3<f32>]>), String>;
+
 /// An opened recording.
 pub(crate) struct RosDataset {
     pub(crate) name: String,
@@ -57,7 +60,7 @@ pub(crate) struct RosDataset {
     /// How long after their stamps messages were recorded.
     pub(crate) delays: Vec<Finding>,
     pub(crate) imu: OnceLock<Result<Arc<[ImuSample]>, String>>,
-    pub(crate) cloud: OnceLock<Result<(Vector3<f64>, Arc<[Point3<f32>]>), String>>,
+    pub(crate) cloud: OnceLock<Swept>,
 }
 
 impl RosDataset {

@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::json;
-use vice_tests::vice_program;
+use vice_tests::{skipped, vice_program};
 
 use crate::annotate::Run;
 
@@ -132,7 +132,7 @@ fn another_user_sees_nothing(page: &Path, host: &str) {
             .ok()
     };
     if nobody("true").is_none_or(|o| !o.status.success()) {
-        println!("skipped: this user cannot act as another one");
+        skipped("this user cannot act as another one");
         return;
     }
     assert!(!nobody(&format!("cat '{}'", page.display())).unwrap().status.success());

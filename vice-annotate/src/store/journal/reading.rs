@@ -185,12 +185,8 @@ fn schema_of(json: &[u8]) -> Option<String> {
 fn in_order(found: &mut Vec<Found>, reading: &mut Reading) {
     if reading.old {
         // Without numbers only the bytes between tell that something is missing, and not how much.
-        for i in 0..found.len() {
-            if found[i].gap_before {
-                let at = found[i].place.seq;
-                reading.damage.push(Damage::Missing { lines: at..at + 1, times_ms: (0, 0) });
-            }
-        }
+        let gaps = found.iter().filter(|f| f.gap_before).map(|f| f.place.seq);
+        reading.damage.extend(gaps.map(|at| Damage::Missing { lines: at..at + 1, times_ms: (0, 0) }));
         return;
     }
     for i in 1..found.len() {

@@ -240,7 +240,7 @@ impl Flaky {
         let mut bytes = self.synced.clone();
         for (at, what) in &self.asked {
             let Some(what) = what else {
-                if chance() % 2 == 0 {
+                if chance().is_multiple_of(2) {
                     apply(&mut bytes, *at, None);
                 }
                 continue;
@@ -248,7 +248,7 @@ impl Flaky {
             let end = *at as usize + what.len();
             for sector in *at as usize / 512..=end / 512 {
                 let (from, to) = ((sector * 512).max(*at as usize), ((sector + 1) * 512).min(end));
-                if from < to && chance() % 2 == 0 {
+                if from < to && chance().is_multiple_of(2) {
                     apply(&mut bytes, from as u64, Some(&what[from - *at as usize..to - *at as usize]));
                 }
             }
