@@ -30,7 +30,7 @@ pub enum Edit {
         /// Downwards, pixels.
         v: f64,
     },
-    /// Begins a segment: of a new point, or of one that goes on elsewhere in the scene. See [`super::segments`].
+    /// Begins a segment: of a new point, or of one that goes on elsewhere in the scene. `segments` says what becomes of the labels behind it.
     Spawn {
         /// The point, new or not.
         point: String,
