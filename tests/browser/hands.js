@@ -27,9 +27,11 @@ export async function labelByHand(window, most) {
   /** @type {Record<string, number>} */
   const keys = {};
   let acts = 0;
+  const idle = () =>
+    page.waitForFunction(() => document.getElementById("job")?.hidden && document.getElementById("saved")?.textContent === "All saved", null, { timeout: TRACK_MS });
   /** @param {string} key */
   const act = async (key) => {
-    await page.waitForFunction(() => document.getElementById("job")?.hidden && document.getElementById("saved")?.textContent === "All saved", null, { timeout: TRACK_MS });
+    await idle();
     acts += 1;
     keys[key] = (keys[key] ?? 0) + 1;
     assert.ok(acts <= most, `more than ${most} acts: ${JSON.stringify(keys)}`);
@@ -38,13 +40,25 @@ export async function labelByHand(window, most) {
   const suggested = () => page.locator("#take-all").waitFor({ timeout: PAGE_MS }).then(() => true, () => false);
   const done = page.locator("#notes").getByText("Done: every lane is full, none doubtful.");
   const task = page.locator("#banners [data-id=task]");
+  const busy = page.locator("#notes").getByText("is under way; nothing else needs you");
+  /** @returns {Promise<"found" | "under way">} what the page says to the key */
+  const answer = async () => {
+    await done.or(task).or(busy).first().waitFor({ timeout: PAGE_MS });
+    if (await done.isVisible() || await task.isVisible()) return "found";
+    return "under way";
+  };
   await act("s");
   assert.ok(await suggested(), "the page suggests points");
   await act("Shift+S");
   await act("Shift+B");
   for (;;) {
     await act("n");
-    await done.or(task).first().waitFor({ timeout: PAGE_MS });
+    // Who is told that the tracker still works waits, and asks once more: no act.
+    while (await answer() === "under way") {
+      await idle();
+      await busy.waitFor({ state: "hidden", timeout: PAGE_MS });
+      await window.press("n");
+    }
     if (await done.isVisible()) return { acts, keys };
     const text = await task.innerText();
     if (text.includes("has not been tracked")) await act("t");

@@ -21,7 +21,7 @@ export class Actions {
     this.tell = tell;
     /** @type {{name: string, frame: number, pixel: Pixel, timer: number} | null} a move by keys not yet sent */
     this.moving = null;
-    /** @type {Promise<unknown>} the last placing, with the tracking that it begins */
+    /** @type {Promise<unknown>} the last placing with the tracking that it begins, or the last tracking asked for */
     this.placing = Promise.resolve();
   }
 
@@ -340,7 +340,17 @@ export class Actions {
    * @param {string[] | null} names of the points, null for all
    * @param {Direction} direction
    */
-  async track(names, direction) {
+  track(names, direction) {
+    const done = this.#trackNow(names, direction);
+    this.placing = done.catch(() => undefined);
+    return done;
+  }
+
+  /**
+   * @param {string[] | null} names
+   * @param {Direction} direction
+   */
+  async #trackNow(names, direction) {
     if (!this.#mayWrite()) return;
     const { app } = this;
     const { frame } = app;
