@@ -2,10 +2,18 @@
 //! same order.
 
 #[cfg(feature = "rayon")]
-pub(crate) use rayon::{current_num_threads, join, prelude::*};
+pub(crate) use rayon::{current_num_threads, prelude::*};
 
 #[cfg(not(feature = "rayon"))]
-pub(crate) use serial::{InOrder, RefInOrder, current_num_threads, join};
+pub(crate) use serial::{InOrder, RefInOrder, current_num_threads};
+
+/// A part of some work, which gives a count. In a box: threads are then compiled for once and not for each kernel.
+pub(crate) type Piece<'a> = Box<dyn FnOnce() -> usize + Send + 'a>;
+
+/// The sum of what the pieces give.
+pub(crate) fn total(pieces: Vec<Piece<'_>>) -> usize {
+    pieces.into_par_iter().map(|piece| piece()).sum()
+}
 
 /// The names of rayon that are in use, without threads.
 #[cfg(not(feature = "rayon"))]
@@ -34,10 +42,6 @@ mod serial {
     }
 
     impl<T: ?Sized> RefInOrder for T {}
-
-    pub(crate) fn join<A, B>(a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B) {
-        (a(), b())
-    }
 
     pub(crate) const fn current_num_threads() -> usize {
         1

@@ -4,13 +4,13 @@ use pulp::{Simd, WithSimd, bytemuck};
 
 use super::number::{REGISTERS, Yes};
 use super::{ARCH, Element, Lanes, Number};
+use crate::parallel::{Piece, total};
 
 /// Points below which one thread is faster: waking another costs some ten microseconds.
 const PARALLEL_POINTS: usize = 32_768;
 /// Points that a thread works on at a time. Smaller pieces share better among busy threads, larger ones cost less.
+/// A multiple of 64, so that no two threads write to the same cache line of a mask.
 const PIECE_POINTS: usize = 16_384;
-/// Bytes; pieces are a multiple of so many points, so that no two threads write to the same line of a mask.
-const CACHE_LINE: usize = 64;
 
 /// A formula from the numbers of a point to numbers of the same point.
 ///
@@ -68,15 +68,17 @@ struct Drive<'a, T, K, const IN: usize, const OUT: usize> {
 }
 
 impl<T: Element, K: Kernel<IN, OUT>, const IN: usize, const OUT: usize> Drive<'_, T, K, IN, OUT> {
-    /// Halves the slices until they are small and lets idle threads take the other half.
+    /// Cuts the slices into pieces, which all threads share.
     fn in_parallel(self) -> usize {
-        let n = self.inout[0].len();
-        if n <= PIECE_POINTS {
-            return ARCH.dispatch(self);
+        let mut pieces: Vec<Piece<'_>> = Vec::with_capacity(self.inout[0].len() / PIECE_POINTS + 1);
+        let mut rest = self;
+        while rest.inout[0].len() > PIECE_POINTS {
+            let (piece, after) = rest.split_at(PIECE_POINTS);
+            pieces.push(Box::new(|| ARCH.dispatch(piece)));
+            rest = after;
         }
-        let (a, b) = self.split_at((n / 2).next_multiple_of(CACHE_LINE));
-        let (a, b) = crate::parallel::join(|| a.in_parallel(), || b.in_parallel());
-        a + b
+        pieces.push(Box::new(|| ARCH.dispatch(rest)));
+        total(pieces)
     }
 
     fn split_at(self, middle: usize) -> (Self, Self) {
@@ -112,21 +114,15 @@ impl<T: Element, K: Kernel<IN, OUT>, const IN: usize, const OUT: usize> WithSimd
         let (n, width) = (self.inout[0].len(), REGISTERS * S::F64_LANES);
         let mut counts = simd.splat_u64s(0);
         let mut at = 0;
-        while n - at >= width {
-            let [first, second] = self.step(simd, at, at + width);
+        // One place for whole registers and for the rest: each call of the formula is compiled once more.
+        while at < n {
+            let [first, second] = self.step(simd, at, (at + width).min(n));
             counts = simd.add_u64s(counts, simd.add_u64s(first, second));
             at += width;
         }
         let mut count = 0;
         for word in bytemuck::cast_slice::<S::u64s, u64>(std::slice::from_ref(&counts)) {
             count += *word;
-        }
-        if at < n {
-            let flags = self.step(simd, at, n);
-            let words: &[u64] = bytemuck::cast_slice(&flags);
-            for word in &words[..n - at] {
-                count += *word;
-            }
         }
         count as usize
     }
@@ -138,21 +134,46 @@ impl<T: Element, K: Kernel<IN, OUT>, const IN: usize, const OUT: usize> Drive<'_
     /// The points `from..to`, at most as many as the lanes hold. Gives 1 where a point has a result, else 0.
     #[inline(always)]
     fn step<S: Simd>(&mut self, simd: S, from: usize, to: usize) -> [S::u64s; REGISTERS] {
+        let width = REGISTERS * S::F64_LANES;
+        let is_whole = to - from == width;
         let zero = Lanes::splat(simd, 0.0);
         let (mut input, mut inout) = ([zero; IN], [zero; OUT]);
-        for k in 0..IN {
-            input[k] = Lanes::load(simd, &self.input[k][from..to]);
+        if is_whole {
+            // A length that is known when compiling: no look at how many there are.
+            for k in 0..IN {
+                input[k] = Lanes::load(simd, &self.input[k][from..][..width]);
+            }
+            for k in 0..OUT {
+                inout[k] = Lanes::load(simd, &self.inout[k][from..][..width]);
+            }
+        } else {
+            for k in 0..IN {
+                input[k] = Lanes::load(simd, &self.input[k][from..to]);
+            }
+            for k in 0..OUT {
+                inout[k] = Lanes::load(simd, &self.inout[k][from..to]);
+            }
         }
+        let Masked { mut numbers, valid, unsure } = self.kernel.lanes(inout, input);
         for k in 0..OUT {
-            inout[k] = Lanes::load(simd, &self.inout[k][from..to]);
-        }
-        let Masked { numbers, valid, unsure } = self.kernel.lanes(inout, input);
-        for k in 0..OUT {
-            let number = Lanes::select(valid, numbers[k], zero.of(f64::NAN));
-            number.store(&mut self.inout[k][from..to]);
+            numbers[k] = Lanes::select(valid, numbers[k], zero.of(f64::NAN));
         }
         let mut flags = ones(simd, valid);
         let words: &mut [u64] = bytemuck::cast_slice_mut(&mut flags);
+        if is_whole {
+            for k in 0..OUT {
+                numbers[k].store(&mut self.inout[k][from..][..width]);
+            }
+        } else {
+            for k in 0..OUT {
+                numbers[k].store(&mut self.inout[k][from..to]);
+            }
+            let mut i = to - from;
+            while i < words.len() {
+                words[i] = 0;
+                i += 1;
+            }
+        }
         if let Some(unsure) = unsure
             && zero.any(unsure)
         {

@@ -5,6 +5,7 @@ use pulp::{Simd, WithSimd};
 use super::kernels::{Project, Unproject};
 use crate::camera::{Camera, with_lens};
 use crate::lanes::{ARCH, Kernel, run};
+use crate::parallel::{Piece, total};
 
 /// Points that are turned into columns at a time: they and their results stay in the nearest cache.
 const BLOCK: usize = 128;
@@ -43,17 +44,12 @@ fn in_pieces<K: Kernel<IN, 2>, const IN: usize, const OUT: usize>(
     input: &[[f64; IN]],
     output: &mut [[f64; OUT]],
 ) -> usize {
+    let blocks = |input, output| ARCH.dispatch(Blocks { kernel, input, output });
     if input.len() <= PIECE || crate::parallel::current_num_threads() == 1 {
-        return ARCH.dispatch(Blocks { kernel, input, output });
+        return blocks(input, output);
     }
-    let middle = (input.len() / 2).next_multiple_of(BLOCK);
-    let (input_a, input_b) = input.split_at(middle);
-    let (output_a, output_b) = output.split_at_mut(middle);
-    let (a, b) = crate::parallel::join(
-        || in_pieces(kernel, input_a, output_a),
-        || in_pieces(kernel, input_b, output_b),
-    );
-    a + b
+    let pieces = input.chunks(PIECE).zip(output.chunks_mut(PIECE));
+    total(pieces.map(|(input, output)| -> Piece<'_> { Box::new(move || blocks(input, output)) }).collect())
 }
 
 /// Turns blocks of rows into columns, and the results back: for the widest instruction set, since moving numbers about
