@@ -8,7 +8,7 @@ mod builder;
 
 pub use builder::TrajectoryBuilder;
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3};
 
 use crate::frames::{Body, FrameError, Rigid, World, WorldFromBody};
 use crate::statistics::middle;
@@ -23,6 +23,15 @@ pub struct PoseRow {
     pub position_m: [f64; 3],
     /// Rotation `world_from_body` as a quaternion, w first.
     pub rotation_wxyz: [f64; 4],
+}
+
+/// What an estimator says of the errors of one of its poses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseCovariance {
+    /// When.
+    pub stamp: Stamp,
+    /// Of x, y, z (metres) and of rotations about x, y, z (radians), along the axes of the world, as ROS has it.
+    pub matrix: Matrix6<f64>,
 }
 
 /// The paper's primary input: the motion between two instants, `T^{B_t1, B_t0}`.

@@ -1,7 +1,7 @@
 //! Pose streams: the reference and the estimates, by the data set's names or from files.
 
+mod checked;
 mod given;
-mod late;
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -64,7 +64,6 @@ impl StreamsSpec {
         let time_offset = loader.time_offset;
         loader.reference = loader.load_reference()?;
         let mut list: Vec<Stream> = loader.reference.iter().cloned().collect();
-        let clock = loader.reference.as_ref().and_then(late::Clock::of);
         let mut inertial = None;
         for (place, spec) in self.estimates.iter().enumerate() {
             let integrates = *spec == EstimateSpec::ImuEuler && !loader.is_stream(IMU_EULER);
@@ -84,11 +83,12 @@ impl StreamsSpec {
             let stream = Stream { name, role: Role::Estimate, trajectory, time_offset, align };
             if let (Some(reference), false) = (&loader.reference, integrates) {
                 loader.suspicions.extend(turned_body(reference, &stream, self.max_gap));
-                loader.suspicions.extend(clock.as_ref().and_then(|clock| clock.wrong(&stream)));
             }
             list.push(stream);
         }
         loader.check_used()?;
+        let integrated = inertial.as_ref().map(|(index, _)| *index);
+        loader.suspicions.extend(checked::wrong(opened, &list, integrated));
         let (anchor, own_anchors) = loader.anchor(&mut list)?;
         // An initial pose moves the anchor to another world than it was integrated in.
         let inertial = inertial.filter(|(index, _)| self.initial_pose.is_none() || *index != anchor);

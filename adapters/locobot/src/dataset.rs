@@ -18,7 +18,7 @@ use vice_core::frames::{BodyFromCamera, Rigid, Sensor};
 use vice_core::imu::{ImuSample, InertialState, fit_velocity};
 use vice_core::suspicion::Suspicion;
 use vice_core::time::{Span, Stamp};
-use vice_core::trajectory::Trajectory;
+use vice_core::trajectory::{PoseCovariance, Trajectory};
 
 use crate::camera::{Images, RosCamera, way_out};
 use crate::choose::{Frames, Topics};
@@ -219,6 +219,13 @@ impl Dataset for RosDataset {
     fn streams(&self) -> Vec<String> {
         let topics = self.poses.keys().map(String::as_str);
         streams::names(&self.tf, &self.frames, topics, self.ground_truth.as_ref())
+    }
+
+    fn pose_covariances(&self, stream: &str) -> DataResult<Vec<PoseCovariance>> {
+        // Other streams are of tf or a file, which say nothing of the kind.
+        let mut said = self.poses.get(stream).map(|topic| topic.covariances.clone()).unwrap_or_default();
+        said.sort_by_key(|each| each.stamp);
+        Ok(said)
     }
 
     fn trajectory(&self, stream: &str) -> DataResult<Trajectory> {

@@ -8,7 +8,9 @@ use vice_core::time::Stamp;
 
 use crate::container::{Locator, Message, Recording, Topic, Visitor, Want};
 use crate::doubts::DAMAGED;
-use crate::message::{PoseKind, camera_info, compressed_head, framed_pose, image_head, tf_message};
+use crate::message::{
+    PoseKind, camera_info, compressed_head, framed_pose, image_head, pose_covariance, tf_message,
+};
 use crate::namespaces::Spaces;
 use crate::pixels::Packing;
 use crate::series::{Delays, ImageTopic, InfoTopic, PoseTopic};
@@ -112,10 +114,13 @@ impl Index {
             }
             Role::Pose(kind) => {
                 let pose = framed_pose(r, kind)?;
+                let said = pose_covariance(r);
                 let topic = self.poses.entry(message.topic).or_insert_with(|| PoseTopic::new(&pose));
                 let stamp = stamp_of(pose.header.stamp);
                 self.delays.add(message.topic, stamp, message.recorded);
-                topic.add(stamp, &pose);
+                if topic.add(stamp, &pose) {
+                    topic.says(stamp, said);
+                }
             }
             Role::Info => {
                 let info = camera_info(r)?;

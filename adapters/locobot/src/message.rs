@@ -111,7 +111,7 @@ impl PoseKind {
     }
 }
 
-/// Reads a message with a pose; covariances and velocities after it are left.
+/// Reads a message with a pose; what comes after it is left.
 pub(crate) fn framed_pose<'a>(r: &mut Reader<'a>, kind: PoseKind) -> WireResult<FramedPose<'a>> {
     let header = r.header()?;
     let child = match kind {
@@ -119,6 +119,12 @@ pub(crate) fn framed_pose<'a>(r: &mut Reader<'a>, kind: PoseKind) -> WireResult<
         PoseKind::Alone => "",
     };
     Ok(FramedPose { header, child, parent_from_child: transform(r)? })
+}
+
+/// Reads the covariance that stands after the pose of `Odometry` and `PoseWithCovarianceStamped`, row by row; `None` of messages
+/// that end there.
+pub(crate) fn pose_covariance(r: &mut Reader<'_>) -> Option<[f64; 36]> {
+    r.f64s().ok()
 }
 
 /// Reads `tf2_msgs/TFMessage`, one transform after the other.

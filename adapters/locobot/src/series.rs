@@ -2,8 +2,10 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use nalgebra::Matrix6;
 use vice_core::suspicion::Suspicion;
 use vice_core::time::{Span, Stamp};
+use vice_core::trajectory::PoseCovariance;
 
 use crate::container::Locator;
 use crate::doubts::{LEFT_OUT, TWO_SOURCES};
@@ -82,6 +84,7 @@ pub(crate) struct PoseTopic {
     /// Whose poses; empty where the messages do not say.
     pub(crate) child: String,
     pub(crate) poses: Vec<(Stamp, Transform)>,
+    pub(crate) covariances: Vec<PoseCovariance>,
     pub(crate) unstamped: u64,
     /// Poses of other frames, as `child in parent`, and how many.
     others: BTreeMap<String, u64>,
@@ -95,26 +98,35 @@ impl PoseTopic {
             parent: pose.header.frame.to_string(),
             child: pose.child.to_string(),
             poses: Vec::new(),
+            covariances: Vec::new(),
             unstamped: 0,
             others: BTreeMap::new(),
             tally: Tally::default(),
         }
     }
 
-    /// Adds a pose; one of other frames than the first is another source's, and only counted.
-    pub(crate) fn add(&mut self, stamp: Stamp, pose: &FramedPose<'_>) {
+    /// Adds a pose and says whether it is kept; one of other frames than the first is another source's, and only counted.
+    pub(crate) fn add(&mut self, stamp: Stamp, pose: &FramedPose<'_>) -> bool {
         let (parent, child) = (pose.header.frame, pose.child);
         if self.parent != parent || self.child != child {
             let of = if child.is_empty() { String::new() } else { format!("{child} ") };
             *self.others.entry(format!("{of}in {parent}")).or_default() += 1;
-            return;
+            return false;
         }
         if stamp.as_nanos() == 0 {
             self.unstamped += 1;
-            return;
+            return false;
         }
-        if let Some(transform) = self.tally.take(&pose.parent_from_child) {
-            self.poses.push((stamp, transform));
+        let taken = self.tally.take(&pose.parent_from_child);
+        self.poses.extend(taken.map(|transform| (stamp, transform)));
+        taken.is_some()
+    }
+
+    /// Keeps what a message says of its pose, where that is not what the one before said: most say one thing for ever.
+    pub(crate) fn says(&mut self, stamp: Stamp, rows: Option<[f64; 36]>) {
+        let Some(matrix) = rows.map(|rows| Matrix6::from_row_slice(&rows)) else { return };
+        if self.covariances.last().is_none_or(|last| last.matrix != matrix) {
+            self.covariances.push(PoseCovariance { stamp, matrix });
         }
     }
 

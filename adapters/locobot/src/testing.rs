@@ -100,8 +100,19 @@ pub(crate) fn tf(topic: &str, nanos: i64, parent: &str, child: &str, at: At) -> 
 }
 
 pub(crate) fn odometry(topic: &str, nanos: i64, parent: &str, child: &str, at: At) -> Msg {
+    odometry_with(topic, nanos, (parent, child), at, &[0.0; 36])
+}
+
+/// The same with a covariance of the pose.
+pub(crate) fn odometry_with(
+    topic: &str,
+    nanos: i64,
+    (parent, child): (&str, &str),
+    at: At,
+    covariance: &[f64; 36],
+) -> Msg {
     Msg::new(topic, "nav_msgs/Odometry", nanos, |o| {
-        at.write(o.header(nanos, parent).str(child)).f64s(&[0.0; 36 + 6 + 36])
+        at.write(o.header(nanos, parent).str(child)).f64s(covariance).f64s(&[0.0; 6 + 36])
     })
 }
 

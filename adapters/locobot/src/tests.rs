@@ -15,7 +15,8 @@ use vice_core::time::{Span, Stamp};
 
 use crate::Locobot;
 use crate::testing::{
-    At, Msg, START, bag, camera_info, db3, image, imu, joint_state, mcap, odometry, pose, run, tf,
+    At, Msg, START, bag, camera_info, db3, image, imu, joint_state, mcap, odometry, odometry_with, pose, run,
+    tf,
 };
 
 const TENTH: i64 = 100_000_000;
@@ -368,4 +369,24 @@ fn a_folder_of_several_recordings_is_a_collection() {
             .to_string()
             .contains("holds 2 recordings")
     );
+}
+
+#[test]
+fn covariances_of_messages_are_handed_over_where_they_change() {
+    let mut messages = run();
+    let frames = ("odom", "base_footprint");
+    for k in 0..6 {
+        let mut rows = [0.0; 36];
+        // The same value twice; a cross term tells rows from columns of a matrix that is not symmetric.
+        (rows[0], rows[1], rows[35]) = (0.01 * f64::from(k / 2), 0.002, 0.5);
+        let (nanos, at) = (START + i64::from(k) * TENTH, At(f64::from(k), 0.0, 0.0, 0.0));
+        messages.push(odometry_with("/filter", nanos, frames, at, &rows));
+    }
+    let data = open(&messages);
+    let said = data.pose_covariances("/filter").unwrap();
+    let stamps: Vec<Stamp> = said.iter().map(|c| c.stamp).collect();
+    assert_eq!(stamps, [at(0), at(2 * TENTH), at(4 * TENTH)]);
+    let m = said[2].matrix;
+    assert_eq!((m[(0, 0)], m[(0, 1)], m[(1, 0)], m[(5, 5)]), (0.02, 0.002, 0.0, 0.5));
+    assert_eq!(data.pose_covariances("odom").unwrap(), [], "tf says nothing of the kind");
 }

@@ -190,6 +190,28 @@ fn an_estimate_that_is_late_or_of_another_convention_is_named_with_its_cure() {
     assert!(mends.contains(&"`estimate-as` conjugate"), "{mends:?}");
     assert_eq!(check(&[data, "--estimate", &conjugate, "--estimate-as", "conjugate"]).0, 0, "mended");
 
+    // Whoever does not ask is told beside the numbers, and whoever mends it is not.
+    let labels = format!("{data}/labels/floor.csv");
+    let suspected = |args: &[&str]| {
+        let run = vice(
+            &[&["evaluate", data, "--labels", &labels, "--depth", "zmap", "--json", "-"], args].concat(),
+        );
+        assert_eq!(run.code, 0, "{}", run.stderr);
+        let document: Value = serde_json::from_str(&run.stdout).unwrap();
+        let list = document["suspicions"].as_array().cloned().unwrap_or_default();
+        let found = list
+            .iter()
+            .filter_map(|s| Some((s["code"].as_str()?.to_string(), s["advice"].as_str()?.to_string())));
+        found.filter(|(code, _)| code.starts_with("check-")).collect::<Vec<_>>()
+    };
+    let told = |code: &str, advice: &str| (code.to_string(), advice.to_string());
+    let reference = ["--estimate", conjugate.as_str()];
+    assert_eq!(suspected(&reference), [told("check-motion", "`estimate-as` conjugate")]);
+    let alone = [&reference[..], &["--reference", "none"]].concat();
+    assert_eq!(suspected(&alone), [told("check-inertial", "`estimate-as` conjugate")]);
+    assert_eq!(suspected(&[&reference[..], &["--estimate-as", "conjugate"]].concat()), []);
+    assert_eq!(suspected(&["--estimate", late.as_str()])[0].0, "check-clock");
+
     let imu = format!("{data}/mav0/imu0/data.csv");
     let run = vice(&["clock", &imu, &late]);
     assert_eq!(run.code, 0, "{}", run.stderr);

@@ -137,6 +137,46 @@ fn spoiled_extrinsics_are_found_by_what_they_are_off() {
     }
 }
 
+/// Turns what the gyroscope and the accelerometer measure: the IMU is screwed on otherwise, and the camera hence lies otherwise
+/// in the body, with the extrinsics as they were.
+fn turn_imu(folder: &Path, turn: UnitQuaternion<f64>) {
+    let list = folder.join("mav0/imu0/data.csv");
+    let text = fs::read_to_string(&list).unwrap();
+    let rows: Vec<String> = text
+        .lines()
+        .map(|line| {
+            let fields: Vec<&str> = line.split(',').collect();
+            if line.starts_with('#') || fields.len() != 7 {
+                return line.to_string();
+            }
+            let numbers: Vec<f64> = fields[1..].iter().map(|f| f.trim().parse().unwrap()).collect();
+            let turned = |k: usize| turn * nalgebra::Vector3::from_column_slice(&numbers[k..k + 3]);
+            let (gyro, accel) = (turned(0), turned(3));
+            let all: Vec<String> = gyro.iter().chain(accel.iter()).map(ToString::to_string).collect();
+            format!("{},{}", fields[0], all.join(","))
+        })
+        .collect();
+    fs::remove_file(&list).unwrap();
+    fs::write(&list, rows.join("\n") + "\n").unwrap();
+}
+
+#[test]
+fn a_camera_that_moved_since_an_earlier_recording_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("knocked");
+    copy(flight(), &path);
+    turn_imu(&path, UnitQuaternion::from_euler_angles(0.0, 6_f64.to_radians(), 0.0));
+    let before = flight().to_str().unwrap();
+    let same = check(flight(), &["--before", before]);
+    assert_eq!(about(&same, "moved", "cam0")["state"], "ok", "{same:#}");
+    let knocked = check(&path, &["--before", before]);
+    let moved = about(&knocked, "moved", "cam0");
+    assert_eq!(moved["state"], "wrong", "{moved:#}");
+    assert!((number(moved, "turned") - 6.0).abs() < 0.8, "{moved:#}");
+    let run = vice(&["check", before, "--before", before]);
+    assert!(run.code == 2 && run.stderr.contains("--images"), "{}", run.stderr);
+}
+
 #[test]
 fn a_camera_that_is_late_is_found_by_its_images() {
     let folder = tempfile::tempdir().unwrap();

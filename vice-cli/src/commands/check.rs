@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use vice_run::check::{CheckRequest, check, list_text, page, render};
 use vice_run::core::check::State;
+use vice_run::request::DatasetSpec;
 
 use crate::inputs::{DatasetArgs, PoseArgs, to_json};
 use crate::outputs::Outputs;
@@ -13,7 +14,7 @@ use crate::terminal::{self, Outcome, Verbosity, with_progress};
 #[derive(Debug, clap::Args)]
 #[command(
     mut_arg("path", |a| a.required(false).required_unless_present("list")),
-    after_help = "Examples:\n  vice check V1_01_easy\n  vice check my_run --estimate odom.tum,slam.tum --json found.json\n  vice check my_run --images\n  vice check --list\n\n\
+    after_help = "Examples:\n  vice check V1_01_easy\n  vice check my_run --estimate odom.tum,slam.tum --json found.json\n  vice check my_run --images\n  vice check today --images --before last_week\n  vice check --list\n\n\
     Exit codes: 0 nothing is wrong, 3 something is wrong, else as ever. `unknown` is no praise: its line says why."
 )]
 pub(crate) struct Args {
@@ -33,6 +34,9 @@ pub(crate) struct Args {
     /// Also decode a sample of images and depth images, and read the cloud.
     #[arg(long)]
     images: bool,
+    /// An earlier recording of the same rig: whether the cameras lie in the body as they did then.
+    #[arg(long, value_name = "DATASET", requires = "images")]
+    before: Option<PathBuf>,
     /// The findings as a page.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -45,7 +49,9 @@ impl Args {
     fn request(&self) -> CheckRequest {
         let mut dataset = self.dataset.spec();
         dataset.calibration.clone_from(&self.calibration);
-        CheckRequest { dataset, images: self.images, streams: self.poses.spec(&self.estimate) }
+        // The same rig, so that all that is said of it holds for both.
+        let before = self.before.as_ref().map(|path| DatasetSpec { path: path.clone(), ..dataset.clone() });
+        CheckRequest { dataset, before, images: self.images, streams: self.poses.spec(&self.estimate) }
     }
 }
 

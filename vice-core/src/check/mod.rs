@@ -7,6 +7,7 @@
 pub mod camera_difference;
 pub mod cameras;
 pub mod clock;
+pub mod covariance;
 pub mod coverage;
 mod cures;
 pub mod hand_eye;
@@ -15,6 +16,7 @@ mod least;
 pub mod lever;
 pub mod loops;
 pub mod motion;
+pub mod moved;
 pub mod optics;
 pub mod path;
 pub mod pictures;
@@ -39,7 +41,7 @@ pub struct Check {
 }
 
 /// All checks, in the order in which they are made.
-pub const CHECKS: [Check; 14] = [
+pub const CHECKS: [Check; 16] = [
     stamps::CHECK,
     coverage::CHECK,
     clock::CHECK,
@@ -48,9 +50,11 @@ pub const CHECKS: [Check; 14] = [
     inertial::GRAVITY,
     lever::CHECK,
     loops::CHECK,
+    covariance::CHECK,
     path::CHECK,
     optics::CHECK,
     hand_eye::CHECK,
+    moved::CHECK,
     cameras::CHECK,
     pictures::CHECK,
     pictures::DEPTH,

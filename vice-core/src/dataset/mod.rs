@@ -27,7 +27,7 @@ use crate::frames::{BodyFromCamera, Cloud, Rigid, World};
 use crate::imu::{ImuSample, InertialState};
 use crate::suspicion::Suspicion;
 use crate::time::Stamp;
-use crate::trajectory::Trajectory;
+use crate::trajectory::{PoseCovariance, Trajectory};
 
 /// The name of the stream that is the ground truth, where a data set has one.
 pub const GROUND_TRUTH: &str = "ground-truth";
@@ -86,6 +86,15 @@ pub trait Dataset: Send + Sync {
     /// # Errors
     /// [`DataError`](crate::error::DataError) if there is no such stream or its rows cannot be used.
     fn trajectory(&self, stream: &str) -> DataResult<Trajectory>;
+
+    /// What the messages of a pose stream say of its own errors, where they do: in the order of time, and only where it differs
+    /// from what was said before.
+    ///
+    /// # Errors
+    /// As [`Dataset::trajectory`].
+    fn pose_covariances(&self, _stream: &str) -> DataResult<Vec<PoseCovariance>> {
+        Ok(Vec::new())
+    }
 
     /// Whether a pose stream was chained from relative motions: it starts anywhere, and knows no floor.
     fn is_relative(&self, _stream: &str) -> bool {

@@ -3,8 +3,11 @@
 use std::sync::Arc;
 
 use vice_core::check::clock::{ClockDoubt, ClockOffset, clock_offset};
+use vice_core::check::moved::{self, Seen};
 use vice_core::check::turning::Turning;
-use vice_core::check::{Finding, State, clock, coverage, inertial, loops, motion, optics, path, stamps};
+use vice_core::check::{
+    Finding, State, clock, covariance, coverage, inertial, loops, motion, optics, path, stamps,
+};
 use vice_core::conventions::Given;
 use vice_core::dataset::{Dataset, GROUND_TRUTH};
 use vice_core::error::{ErrorKind, one_line};
@@ -19,6 +22,7 @@ use super::CheckRequest;
 use super::cloud::World3d;
 use super::{cloud, images, stereo, turns};
 use crate::error::{RunError, RunResult};
+use crate::formats;
 use crate::open::Opened;
 use crate::progress::Progress;
 
@@ -41,7 +45,12 @@ pub(super) struct Gathered {
     /// What cannot be read, and what readers say.
     read: Vec<Finding>,
     suspicions: Suspicions,
+    /// An earlier recording of the same rig.
+    earlier: Option<Box<Gathered>>,
 }
+
+/// How cameras lie in the body, by their names.
+type Seens = Vec<(String, Seen)>;
 
 struct PoseStream {
     name: String,
@@ -80,6 +89,7 @@ pub(super) fn gather(request: &CheckRequest, raw: Arc<dyn Dataset>) -> RunResult
         max_gap: request.streams.max_gap,
         read,
         suspicions: Suspicions::new(),
+        earlier: None,
         dataset,
     };
     match gathered.dataset.imu() {
@@ -89,6 +99,11 @@ pub(super) fn gather(request: &CheckRequest, raw: Arc<dyn Dataset>) -> RunResult
     gathered.streams(request, opened.as_ref())?;
     if let Some(opened) = &opened {
         gathered.suspicions.extend(opened.suspicions());
+    }
+    if let Some(spec) = &request.before {
+        let raw = spec.open_raw(&formats::registry(&spec.plugins)?).map_err(|e| e.of("before"))?;
+        let earlier = CheckRequest { dataset: spec.clone(), ..CheckRequest::default() };
+        gathered.earlier = Some(Box::new(gather(&earlier, raw)?));
     }
     Ok(gathered)
 }
@@ -230,6 +245,23 @@ impl Gathered {
         for camera in &self.cameras {
             found.extend(images::look(self.dataset.as_ref(), camera, &world, scan.as_ref()));
         }
+        let seen = self.turns(found, progress);
+        if let Some(earlier) = &self.earlier {
+            // Its other findings are its own.
+            let before = earlier.turns(&mut Vec::new(), progress);
+            for camera in &self.cameras {
+                let of = |seen: &Seens| seen.iter().find(|(name, _)| name == camera).map(|(_, s)| s.clone());
+                found.push(moved::moved(camera, of(&before).as_ref(), of(&seen).as_ref()));
+            }
+        }
+        // Each against the first one: others follow.
+        if let Some((first, others)) = self.cameras.split_first() {
+            found.extend(others.iter().filter_map(|c| stereo::look(self.dataset.as_ref(), first, c)));
+        }
+    }
+
+    /// Findings about how the cameras turn by their images, and how each lies in the body, where that is told.
+    fn turns(&self, found: &mut Vec<Finding>, progress: &Progress<'_>) -> Seens {
         let turnings: Vec<Option<Turning>> =
             self.streams.iter().map(|s| Turning::of_poses(&s.trajectory)).collect();
         let gyro = Turning::of_gyro(&self.imu);
@@ -240,13 +272,13 @@ impl Gathered {
             Some(turns::Source { name: &stream.name, turning, is_body: stream.is_truth, is_gyro: false })
         });
         let sources: Vec<turns::Source<'_>> = gyro.into_iter().chain(streams).collect();
+        let mut all = Seens::new();
         for camera in &self.cameras {
-            found.extend(turns::look(self.dataset.as_ref(), camera, &sources, progress));
+            let (said, seen) = turns::look(self.dataset.as_ref(), camera, &sources, progress);
+            found.extend(said);
+            all.extend(seen.map(|seen| (camera.clone(), seen)));
         }
-        // Each against the first one: others follow.
-        if let Some((first, others)) = self.cameras.split_first() {
-            found.extend(others.iter().filter_map(|c| stereo::look(self.dataset.as_ref(), first, c)));
-        }
+        all
     }
 
     /// Findings about clocks, and the offset of each stream to the reference and to the IMU, where it is known.
@@ -307,6 +339,10 @@ impl Gathered {
                 ((&*reference.name, &reference.trajectory), (&*stream.name, &stream.trajectory));
             found.extend(motion::motion(truth, own, offset, given));
             found.extend(loops::loops(truth, own, offset));
+            let said = self.dataset.pose_covariances(&stream.name).unwrap_or_default();
+            if !said.is_empty() {
+                found.push(covariance::covariance(truth, own, &said, offset, self.max_gap));
+            }
         }
     }
 

@@ -25,7 +25,7 @@ pub use clock::{ClockDocument, ClockRequest, compare_clocks};
 pub use page::page;
 pub use text::{head, list_text, render};
 
-use crate::error::RunResult;
+use crate::error::{RunError, RunResult};
 use crate::formats;
 use crate::progress::Progress;
 use crate::request::{DatasetSpec, Request, StreamsSpec};
@@ -42,6 +42,9 @@ pub struct CheckRequest {
     /// Also look at a sample of images and depth images, and at the cloud.
     #[serde(default)]
     pub images: bool,
+    /// An earlier recording of the same rig, with images: whether the cameras lie in the body as they did then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub before: Option<DatasetSpec>,
 }
 
 /// The document `vice.check/1`.
@@ -79,8 +82,12 @@ pub struct Counts {
 impl CheckRequest {
     /// The files that are read.
     pub fn inputs(&self) -> Vec<PathBuf> {
-        Request { dataset: self.dataset.clone(), streams: self.streams.clone(), ..Request::default() }
-            .inputs()
+        let files = |dataset: &DatasetSpec, streams: &StreamsSpec| {
+            Request { dataset: dataset.clone(), streams: streams.clone(), ..Request::default() }.inputs()
+        };
+        let mut inputs = files(&self.dataset, &self.streams);
+        inputs.extend(self.before.iter().flat_map(|before| files(before, &StreamsSpec::default())));
+        inputs
     }
 }
 
@@ -102,6 +109,10 @@ pub fn check_open(
     dataset: Arc<dyn Dataset>,
     progress: &Progress<'_>,
 ) -> RunResult<CheckDocument> {
+    if request.before.is_some() && !request.images {
+        return Err(RunError::usage("before", "compares what the images of both recordings say")
+            .advise("give `images`"));
+    }
     let gathered = gather::gather(request, dataset)?;
     let mut findings = gathered.findings(request.images.then_some(progress));
     findings.sort_by_key(place);

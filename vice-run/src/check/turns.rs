@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use vice_core::camera::Camera;
 use vice_core::check::clock::{ClockDoubt, ClockOffset, clock_offset, images_finding};
 use vice_core::check::hand_eye::{self, Subject, hand_eye};
+use vice_core::check::moved::Seen;
 use vice_core::check::turning::Turning;
 use vice_core::check::{Finding, State};
 use vice_core::dataset::Dataset;
@@ -39,15 +40,18 @@ pub(super) struct Source<'a> {
     pub(super) is_gyro: bool,
 }
 
-/// Findings about the clock and the rotation of a camera, by its images.
+/// Findings about the clock and the rotation of a camera, by its images; and how it lies in the body by the first source that
+/// tells, gyroscope and ground truth before others.
 pub(super) fn look(
     dataset: &dyn Dataset,
     camera: &str,
     sources: &[Source<'_>],
     progress: &Progress<'_>,
-) -> Vec<Finding> {
-    let (Ok(frames), Ok(model)) = (dataset.frames(camera), dataset.camera(camera)) else { return Vec::new() };
-    let unknown = |says: &str| vec![Finding::new(hand_eye::CHECK.name, camera, State::Unknown, says)];
+) -> (Vec<Finding>, Option<Seen>) {
+    let (Ok(frames), Ok(model)) = (dataset.frames(camera), dataset.camera(camera)) else {
+        return (Vec::new(), None);
+    };
+    let unknown = |says: &str| (vec![Finding::new(hand_eye::CHECK.name, camera, State::Unknown, says)], None);
     let Some(first) = sources.first() else {
         return unknown("there are neither poses nor IMU to compare the turns of the images with");
     };
@@ -66,7 +70,7 @@ pub(super) fn look(
         })
         .collect();
     let given = frames.first().and_then(|stamp| extrinsics(*stamp));
-    let mut found = Vec::new();
+    let (mut found, mut seen) = (Vec::new(), None::<(bool, Seen)>);
     for source in sources {
         let expected = source.turning.of_frame(extrinsics);
         let answer = clock_offset(expected.as_ref().unwrap_or(source.turning), &turning, None);
@@ -76,9 +80,14 @@ pub(super) fn look(
                 Subject { camera, source: source.name, is_body: source.is_body, given, others: &others };
             let answer = hand_eye(&expected, &turning, lag_s(&answer), source.is_gyro);
             found.push(hand_eye::finding(&subject, &answer));
+            if let Ok(answer) = &answer
+                && seen.as_ref().is_none_or(|(is_body, _)| source.is_body && !is_body)
+            {
+                seen = Some((source.is_body, Seen::of(source.name, &given, answer)));
+            }
         }
     }
-    found
+    (found, seen.map(|(_, seen)| seen))
 }
 
 /// What is added to the camera's stamps, where that is known.
