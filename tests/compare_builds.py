@@ -28,7 +28,7 @@ def commands(shared):
                                "--align", "yaw", "--time-offset", "0.01", "--subsets", "2", "--max-skipped", "100"]
     yield "euroc plane", ["evaluate", euroc, "--labels", labels / "floor.csv", "--estimate", "imu-euler",
                           "--floor-plane", "0,0,1,-0.05", "--fps", "10", "--duration", "30"]
-    yield "depth compare", ["depth", "compare", euroc, "--labels", labels / "floor.csv", "--source", "floor,zmap"]
+    yield "depth compare", ["depth", "compare", euroc, "--labels", labels / "floor.csv", "--depth", "floor,zmap"]
     yield "diagnose", ["diagnose", euroc, "--labels", labels / "floor.csv", "--estimate", "imu-euler"]
     yield "sensitivity", ["sensitivity", euroc, "--labels", labels / "floor.csv", "--estimate", "ground-truth"]
     robot = data / "locobot"

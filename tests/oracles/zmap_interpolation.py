@@ -20,7 +20,7 @@ FRAMES = (0, 60, 120)
 
 def depth(folder, source, frame, out, how=None):
     """Depth of a frame in metres, NaN where none."""
-    args = [VICE, "depth", folder, "--at", str(frame), "--source", source, "--out", out]
+    args = [VICE, "depth", folder, "--at", str(frame), "--depth", source, "--out", out]
     subprocess.run(args + (["--zmap-interpolation", how] if how else []), check=True, capture_output=True)
     return np.load(f"{out}/{source}.npy")
 

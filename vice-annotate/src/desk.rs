@@ -46,6 +46,7 @@ impl Desk {
         request.protocol.check()?;
         // Suggestions look at whatever knows the scene, besides the source that dots take their depth from.
         request.depth.check(&[DepthName::ZCam, DepthName::ZMap])?;
+        request.depth.check_of_frames()?;
         if is_auto(&request.labels.file) {
             return Err(RunError::usage("labels", "what a person labels needs a file")
                 .advise("name one; `vice labels track` makes labels to begin with"));

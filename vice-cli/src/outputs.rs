@@ -82,6 +82,11 @@ pub(crate) struct JsonArgs {
 }
 
 impl JsonArgs {
+    /// Whether the document is printed in place of the text.
+    pub(crate) fn is_printed(&self) -> bool {
+        self.json.as_deref() == Some(Path::new(STDOUT))
+    }
+
     /// Writes the document where it is asked for, and prints the text; true if the text was printed.
     pub(crate) fn put(
         &self,

@@ -1,5 +1,8 @@
 //! What a person sees on the terminal: one line an error, warnings, progress.
 
+mod narrow;
+
+use std::borrow::Cow;
 use std::fmt;
 use std::io::{IsTerminal, Write};
 
@@ -244,7 +247,15 @@ pub(crate) fn is_broken_pipe(error: &anyhow::Error) -> bool {
 
 /// Writes results to standard output.
 pub(crate) fn print(text: &str) -> anyhow::Result<()> {
-    let mut out = std::io::stdout().lock();
+    let out = std::io::stdout();
+    // What goes into a file or a pipe stays as it is.
+    let text = match terminal_size::terminal_size_of(&out) {
+        Some((terminal_size::Width(width), _)) if out.is_terminal() => {
+            Cow::Owned(narrow::fitted(text, usize::from(width)))
+        }
+        _ => Cow::Borrowed(text),
+    };
+    let mut out = out.lock();
     out.write_all(text.as_bytes())?;
     Ok(out.flush()?)
 }

@@ -108,11 +108,17 @@ pub enum DepthMiss {
     /// No place of the second camera's image is surely the same.
     #[error("no place of the second camera's image is surely the same")]
     NoMatch,
+    /// The later labels are too few or seen from too near to say how far away the point is.
+    #[error("the later labels are too few or seen from too near by to say how far away the point is")]
+    LittleParallax,
+    /// By the motion of the stream the rays of the labels do not meet in front of the camera.
+    #[error("by the stream's motion the rays of the labels do not meet in front of the camera")]
+    RaysApart,
 }
 
 /// Something that knows the depth of pixels at key frames.
 pub trait DepthSource: Send + Sync {
-    /// Name in tables and documents: `floor`, `zmap`, `zcam`, `mesh`, `tag`, `stereo`.
+    /// Name in tables and documents: `floor`, `zmap`, `zcam`, `mesh`, `tag`, `stereo`, `triangulated`.
     fn name(&self) -> &str;
 
     /// Depths of pixels of one key frame, in their order. Asked once for all pixels of a key frame, since what can be
@@ -133,6 +139,12 @@ pub trait DepthSource: Send + Sync {
 
     /// Whether the source takes a shape for granted, as a floor does, and so is no witness against one that measures.
     fn is_assumed(&self) -> bool {
+        false
+    }
+
+    /// Whether the depth of a point is what its own later labels and the stream under test say, so that nobody but an
+    /// evaluation can ask it, and each stream has depths of its own.
+    fn needs_track(&self) -> bool {
         false
     }
 

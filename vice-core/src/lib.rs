@@ -46,3 +46,4 @@ pub mod time;
 pub mod time_unit;
 pub mod track;
 pub mod trajectory;
+pub mod triangulate;

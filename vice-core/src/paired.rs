@@ -167,6 +167,7 @@ mod tests {
             depth_z_m: 1.0,
             point_world_m: None,
             on_edge: false,
+            triangulated: None,
         };
         PixelPart {
             stream: "s".to_string(),
@@ -182,6 +183,7 @@ mod tests {
             scored: errors.len() as u64,
             skipped: vec![],
             depth_doubts: vec![],
+            triangulation: None,
             keyframes: [("a", 0), ("a", 10), ("b", 0), ("b", 10)].map(keyframe).to_vec(),
             samples: errors.iter().map(sample).collect(),
         }

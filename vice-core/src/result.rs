@@ -4,9 +4,12 @@
 
 mod depth_doubt;
 mod held;
+mod triangulation;
 
 pub use depth_doubt::{DepthDoubt, DepthDoubtReason};
 pub use held::{AsideReason, Figure, HeldPart, SetAside, WindowPart};
+pub(crate) use triangulation::{CANNOT_SHOW, RULE};
+pub use triangulation::{TriangulatedPart, TriangulationPart};
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -102,6 +105,9 @@ pub struct PixelPart {
     /// Key frames whose depth is doubtful, and why.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub depth_doubts: Vec<DepthDoubt>,
+    /// How the depths came about and what they cannot show, where labels gave them.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub triangulation: Option<TriangulationPart>,
     /// The scored samples; empty where they were not asked for.
     pub samples: Vec<Sample>,
 }
@@ -137,6 +143,9 @@ pub struct KeyframePart {
     /// The pixel's neighbourhood straddles a depth edge.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "std::ops::Not::not"))]
     pub on_edge: bool,
+    /// What the depth rests on, where later labels gave it.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub triangulated: Option<TriangulatedPart>,
 }
 
 /// One scored label.

@@ -47,7 +47,7 @@ pub enum SkipReason {
 
 impl SkipReason {
     /// All reasons.
-    const ALL: [Self; 28] = [
+    const ALL: [Self; 30] = [
         Self::NoFrame,
         Self::KeyframeNoFrame,
         Self::BeforeFirstKeyframe,
@@ -76,6 +76,8 @@ impl SkipReason {
         Self::NoDepth(DepthMiss::NoSurface),
         Self::NoDepth(DepthMiss::NoTarget),
         Self::NoDepth(DepthMiss::NoMatch),
+        Self::NoDepth(DepthMiss::LittleParallax),
+        Self::NoDepth(DepthMiss::RaysApart),
     ];
 
     /// Whether somebody left the label out on purpose: no gap in the data.
@@ -120,6 +122,8 @@ impl SkipReason {
                 DepthMiss::NoSurface => "keyframe-no-surface",
                 DepthMiss::NoTarget => "keyframe-no-target",
                 DepthMiss::NoMatch => "keyframe-no-match",
+                DepthMiss::LittleParallax => "keyframe-little-parallax",
+                DepthMiss::RaysApart => "keyframe-rays-apart",
             },
         }
     }

@@ -15,7 +15,7 @@ use vice_run::report::frames::Shots;
 use vice_run::report::html::{IMAGE_BUDGET_BYTES, Run, render};
 use vice_run::report::{csv, latex, table};
 use vice_run::require::{Requirement, broken};
-use vice_run::result::{ResultDocument, read};
+use vice_run::result::{ResultDocument, check_unmixed, read};
 
 use crate::document::{Document, loads, write};
 use crate::errors::{Answer, OfPython, missing, usage};
@@ -296,6 +296,7 @@ pub(crate) fn compare(
     seed: u64,
 ) -> Answer<Document> {
     let runs: Vec<_> = results.iter().map(|(name, r)| (name.clone(), r.document.as_ref().clone())).collect();
+    check_unmixed(runs.iter().map(|(_, document)| document))?;
     let by = match by {
         Some(by) => by.parse::<By>().map_err(|e| usage("by", e))?,
         None => By::usual(&runs),

@@ -168,11 +168,11 @@ def test_commands_in_processes_of_their_own(flight: Path, labels: Path, tmp_path
     out = tmp_path / "truth.txt"
     vice.convert(flight, out, to="tum")
     assert len(vice.Trajectory.read(out)) == len(vice.open(flight).stream("ground-truth"))
-    assert "floor" in vice.depth_compare(flight, labels, source=["floor", "zmap"])
+    assert "floor" in vice.depth_compare(flight, labels, depth=["floor", "zmap"])
     vice.convert_labels(labels, tmp_path / "l.json")
     assert vice.Labels.read(tmp_path / "l.json") == vice.Labels.read(labels)
-    with pytest.raises(vice.UsageError, match="--source"):
-        vice.depth_compare(flight, labels, source="floor")
+    with pytest.raises(vice.UsageError, match="--depth"):
+        vice.depth_compare(flight, labels, depth="floor")
     with pytest.raises(vice.UsageError):
         vice.program("evaluate", "--no-such-option")
 

@@ -38,7 +38,7 @@ impl Told {
         let Some(place) = ViceToml::place(path) else { return Ok(None) };
         let file = ViceToml::read(&place)?;
         let calibration = file.calibration.as_ref().map(CalibrationFile::read).transpose()?;
-        let named = file.cloud.iter().chain(file.streams.values().map(|s| &s.file));
+        let named = file.cloud.iter().chain(&file.mesh).chain(file.streams.values().map(|s| &s.file));
         if let Some(gone) = named.into_iter().find(|f| !f.is_file()) {
             return Err(DataError::of_kind(ErrorKind::Missing, "no such file")
                 .at(gone)
@@ -124,6 +124,12 @@ struct Beside {
 }
 
 impl Beside {
+    /// A scan that the file names, in its place in the world.
+    fn scan(&self, path: &Path) -> CloudRef {
+        let world_from_cloud = self.told.file.world_from_cloud.unwrap_or_else(Rigid::identity);
+        CloudRef { source: CloudSource::File(path.to_path_buf()), world_from_cloud }
+    }
+
     /// The calibration for a camera, where it says something of it.
     fn calibration(&self, camera: &str) -> Option<CalibrationFile> {
         self.told.calibration.as_ref()?.for_camera(camera, &self.inner.cameras()).ok()
@@ -263,16 +269,15 @@ impl Dataset for Beside {
 
     fn cloud(&self) -> DataResult<Option<CloudRef>> {
         // Its place is said in the world as it is used; that of the data set's own is turned with the poses.
-        if let Some(path) = &self.told.file.cloud {
-            let world_from_cloud = self.told.file.world_from_cloud.unwrap_or_else(Rigid::identity);
-            return Ok(Some(CloudRef { source: CloudSource::File(path.clone()), world_from_cloud }));
+        match &self.told.file.cloud {
+            Some(path) => Ok(Some(self.scan(path))),
+            None => Ok(self.inner.cloud()?.map(|own| self.turned(own))),
         }
-        Ok(self.inner.cloud()?.map(|own| self.turned(own)))
     }
 
     fn mesh(&self) -> DataResult<Option<CloudRef>> {
-        match &self.told.file.cloud {
-            Some(_) => self.cloud(),
+        match &self.told.file.mesh {
+            Some(path) => Ok(Some(self.scan(path))),
             None => Ok(self.inner.mesh()?.map(|own| self.turned(own))),
         }
     }

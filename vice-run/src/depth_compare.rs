@@ -73,8 +73,9 @@ pub struct Cost {
 /// [`RunError`] if fewer than two sources are named, or something cannot be read.
 pub fn compare_depths(request: &Request) -> RunResult<DepthComparison> {
     request.check()?;
+    request.depth.check_of_frames()?;
     if request.depth.names().len() < 2 {
-        return Err(RunError::usage("source", "name two sources to compare, such as floor,zmap"));
+        return Err(RunError::usage("depth", "name two sources to compare, such as floor,zmap"));
     }
     let scene = Scene::open(&request.dataset, &request.streams.reference, request.streams.max_gap)?;
     let opened = &scene.opened;

@@ -34,6 +34,7 @@ pub fn depth_images(
     at: &str,
     progress: &Progress<'_>,
 ) -> RunResult<DepthImages> {
+    depth.check_of_frames()?;
     let opened = &scene.opened;
     let frame = scene.frame_at(at)?;
     let keyframe = scene.keyframe(frame)?;

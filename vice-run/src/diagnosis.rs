@@ -87,6 +87,7 @@ pub fn diagnose_all(
     progress: &Progress<'_>,
 ) -> RunResult<Answers> {
     let flaws = looking.flaws();
+    request.depth.check_of_frames()?;
     request.with_evaluation(opened, false, progress, |evaluation, streams, tracking| {
         let mut answers = Vec::new();
         for stream in estimates(evaluation) {
@@ -134,6 +135,7 @@ pub fn sensitivity_of(
     progress: &Progress<'_>,
 ) -> RunResult<(SensitivityDocument, Suspicions)> {
     let flaws = looking.flaws();
+    request.depth.check_of_frames()?;
     request.with_evaluation(opened, false, progress, |evaluation, streams, _| {
         let estimates = estimates(evaluation);
         let ([stream], [_]) = (estimates.as_slice(), evaluation.depths) else {

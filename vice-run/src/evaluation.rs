@@ -46,7 +46,13 @@ impl LabelsSpec {
             return Err(RunError::usage("labels", "no file of labels is named"));
         }
         let (labels, suspicions) = match opened.in_memory.labels(&self.file)? {
-            Some(labels) => (labels.clone(), Suspicions::new()),
+            Some(labels) => {
+                if let Some(camera) = labels.camera.as_ref().filter(|c| **c != opened.camera_name) {
+                    let problem = format!("are of camera {camera}, not of {}", opened.camera_name);
+                    return Err(RunError::usage("labels", problem));
+                }
+                (labels.clone(), Suspicions::new())
+            }
             None => {
                 let place = Place::of_file(&self.file)?;
                 let frames = Some(&*opened.frames);
@@ -55,6 +61,7 @@ impl LabelsSpec {
                     points => labels::read_points(place.path(), frames, points),
                 })?;
                 let shown = address::shown_path(&self.file);
+                let file = file.of_camera(&opened.camera_name).map_err(|e| e.at(&shown))?;
                 file.check_image_size(opened.camera.width(), opened.camera.height())
                     .map_err(|e| e.at(shown))?;
                 (file.labels, file.suspicions)
@@ -113,6 +120,8 @@ impl Request {
         let names = self.depth.names();
         // A point on the floor has depth by all sources; one elsewhere not by the floor.
         let asked = names.iter().find(|n| **n == DepthName::Floor).or(names.first());
+        // What the labels give is nowhere known before there are labels.
+        let asked = asked.filter(|name| **name != DepthName::Triangulated);
         let spec = TrackingSpec {
             dataset: self.dataset.clone(),
             protocol: self.protocol,

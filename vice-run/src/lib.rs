@@ -51,6 +51,7 @@ pub mod report;
 pub mod request;
 pub mod require;
 pub mod result;
+pub mod rig;
 pub mod scans;
 pub mod scene;
 pub mod sources;

@@ -59,8 +59,8 @@ impl DatasetSpec {
         // Small files first, so that a mistake in one costs nothing.
         let calibration = self.calibration()?;
         let floor = self.floor()?;
-        let dataset = self.open_raw(&formats::registry(&self.plugins)?)?;
-        self.calibrate(dataset, calibration, floor)
+        let (dataset, told) = self.open_told(&formats::registry(&self.plugins)?)?;
+        self.calibrate(dataset, told, calibration, floor)
     }
 
     /// The recording as a `vice.toml` beside it says that it is, with formats that were loaded before: no camera is chosen,
@@ -69,6 +69,11 @@ impl DatasetSpec {
     /// # Errors
     /// [`RunError`] if no format reads it.
     pub fn open_raw(&self, registry: &Registry) -> RunResult<Arc<dyn Dataset>> {
+        Ok(self.open_told(registry)?.0)
+    }
+
+    /// The same, and what the `vice.toml` says.
+    fn open_told(&self, registry: &Registry) -> RunResult<(Arc<dyn Dataset>, Option<Told>)> {
         let mut options = OpenOptions { settings: self.set.clone() };
         // A setting may name a file.
         for value in options.settings.values_mut().filter(|v| is_address(v)) {
@@ -84,8 +89,8 @@ impl DatasetSpec {
             false => Arc::from(dataset),
         };
         Ok(match told {
-            Some(told) => told.apply(dataset, registry)?,
-            None => dataset,
+            Some(told) => (told.clone().apply(dataset, registry)?, Some(told)),
+            None => (dataset, None),
         })
     }
 
@@ -100,12 +105,13 @@ impl DatasetSpec {
     /// # Errors
     /// [`RunError`] if what overrides it cannot be used, or the camera is not there.
     pub fn apply_to(&self, dataset: Arc<dyn Dataset>) -> RunResult<Opened> {
-        self.calibrate(dataset, self.calibration()?, self.floor()?)
+        self.calibrate(dataset, self.told()?, self.calibration()?, self.floor()?)
     }
 
     fn calibrate(
         &self,
         dataset: Arc<dyn Dataset>,
+        told: Option<Told>,
         calibration: Option<CalibrationFile>,
         floor: Option<Floor>,
     ) -> RunResult<Opened> {
@@ -163,7 +169,7 @@ impl DatasetSpec {
             camera,
             frames,
             calibration,
-            told: self.told()?,
+            told,
             scans: None,
             in_memory,
             staged: Arc::new(staged),

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use vice_core::dataset::{CloudRef, CloudSource, Dataset};
 use vice_core::depth::DepthSource;
 use vice_core::error::one_line;
+use vice_core::evaluate::TriangulatedDepth;
 use vice_core::suspicion::Suspicion;
 use vice_depth::{
     Cloud, CloudOptions, FloorDepth, Mesh, MeshDepth, ZCamDepth, ZCamOptions, ZMapDepth, ZMapOptions,
@@ -30,7 +31,7 @@ impl DepthSpec {
     /// asked for. One that cannot be made is a suspicion, since nothing is scored with it.
     pub fn make_checks(&self, opened: &Opened) -> (Vec<Box<dyn DepthSource>>, Vec<Suspicion>) {
         let (mut made, mut failed) = (Vec::new(), Vec::new());
-        if self.compare == Some(false) {
+        if self.compare == Some(false) || self.is_triangulated() {
             return (made, failed);
         }
         let asked = self.names();
@@ -95,6 +96,7 @@ impl DepthSpec {
                 let second = self.second_camera(dataset.as_ref(), camera)?;
                 Ok(Box::new(StereoDepth::new(Arc::clone(dataset), camera, &second)?))
             }
+            DepthName::Triangulated => Ok(Box::new(TriangulatedDepth)),
             DepthName::Tag => {
                 let size_m = self.tag_size_m.ok_or_else(|| {
                     RunError::usage("depth", "tag: how large the tags are is not known")

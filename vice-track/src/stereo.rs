@@ -122,7 +122,7 @@ impl DepthSource for StereoDepth {
                 ErrorKind::Unsupported,
                 format!("the depth source stereo is of single points, and {} pixels are asked", pixels.len()),
             )
-            .hint("`vice depth compare --source zmap,stereo` shows it at labelled points"));
+            .hint("`vice depth compare --depth zmap,stereo` shows it at labelled points"));
         }
         let Some(index) = self.beside(keyframe.stamp) else {
             *self.alone.lock().unwrap_or_else(PoisonError::into_inner) += 1;

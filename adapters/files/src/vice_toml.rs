@@ -4,7 +4,7 @@
 //! # let text = r#"
 //! calibration = "camchain.yaml"      # as --calibration takes it
 //! cloud = "scan.ply"                 # the scan of the scene
-//! mesh = "scan.ply"                  # the same, for the depth source mesh: one of the two
+//! mesh = "faces.ply"                 # its faces, for the depth source mesh; each of the two stands in for the other
 //! world_from_cloud = [1, 0, 0, 0,  0, 1, 0, 0,  0, 0, 1, 0,  0, 0, 0, 1]   # or x, y, z, qx, qy, qz, qw
 //! floor = [0.0, 0.0, 1.0, 0.0]       # nx, ny, nz, d of n·p + d = 0 in the world, metres
 //! time_offset_s = 0.02               # added to the stamps of estimates
@@ -51,8 +51,10 @@ pub struct ViceToml {
     pub path: PathBuf,
     /// A calibration file.
     pub calibration: Option<PathBuf>,
-    /// A scan of the scene, and whether its faces are what is meant.
+    /// A scan of the scene: what `mesh` names where there is no other.
     pub cloud: Option<PathBuf>,
+    /// Faces of the scene: what `cloud` names where there are no others.
+    pub mesh: Option<PathBuf>,
     /// Place of the scan in the world.
     pub world_from_cloud: Option<Rigid<World, Cloud>>,
     /// nx, ny, nz, d of the floor.
@@ -198,7 +200,7 @@ impl ViceToml {
         let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
         let of_streams =
             read.streams.values_mut().flat_map(|s| std::iter::once(&mut s.file).chain(&mut s.times));
-        let own = [&mut read.calibration, &mut read.cloud, &mut read.labels.file];
+        let own = [&mut read.calibration, &mut read.cloud, &mut read.mesh, &mut read.labels.file];
         for file in own.into_iter().flatten().chain(of_streams) {
             if *file != Path::new("auto") {
                 *file = folder.join(&*file);
@@ -220,10 +222,8 @@ impl ViceToml {
                 None => error,
             }
         };
-        if file.cloud.is_some() && file.mesh.is_some() && file.cloud != file.mesh {
-            return Err(wrong("mesh", "cloud and mesh name two files, and a data set has one scan".into()));
-        }
-        let cloud = file.cloud.or(file.mesh);
+        let cloud = file.cloud.clone().or(file.mesh.clone());
+        let mesh = file.mesh.or(file.cloud);
         let world_from_cloud =
             file.world_from_cloud.map(|n| place_of(&n).map_err(|e| wrong("world_from_cloud", e)));
         let world_from_cloud = world_from_cloud.transpose()?;
@@ -268,6 +268,7 @@ impl ViceToml {
             path: PathBuf::new(),
             calibration: file.calibration,
             cloud,
+            mesh,
             world_from_cloud,
             floor: file.floor,
             time_offset,
@@ -393,7 +394,6 @@ mod tests {
             error("\nup = \"w\"\n")
         );
         assert!(error("[labels]\nfyle = \"x\"\n").contains("line 2"));
-        assert!(error("cloud = \"a\"\nmesh = \"b\"\n").starts_with("line 2: mesh"));
         assert!(error("world_from_cloud = [1, 2]\ncloud = \"a\"\n").contains("2 numbers"));
         assert!(error("floor = [1]\n").starts_with("line 1"));
         let read = ViceToml::parse("calibraton = \"x\"\n").unwrap();
@@ -414,5 +414,19 @@ mod tests {
             assert!((rotation.determinant() - 1.0).abs() < 1e-12, "{text}");
         }
         assert_eq!(Up::parse("up"), None);
+    }
+
+    #[test]
+    fn a_scan_and_its_faces_may_be_two_files() {
+        let read = |text: &str| ViceToml::parse(text).unwrap();
+        let path = |name: &str| Some(PathBuf::from(name));
+        for (text, cloud, mesh) in [
+            ("cloud = \"a.laz\"\nmesh = \"b.ply\"\n", path("a.laz"), path("b.ply")),
+            ("cloud = \"a.ply\"\n", path("a.ply"), path("a.ply")),
+            ("mesh = \"a.ply\"\n", path("a.ply"), path("a.ply")),
+            ("up = \"z\"\n", None, None),
+        ] {
+            assert_eq!((read(text).cloud, read(text).mesh), (cloud, mesh), "{text}");
+        }
     }
 }

@@ -12,6 +12,9 @@ fn most_coefficients(model: &str) -> Option<usize> {
         "plumb_bob" | "radtan" | "radial-tangential" | "brown_conrady" => Some(5),
         "rational_polynomial" | "rational" => Some(8),
         "equidistant" | "fisheye" | "kannala_brandt" => Some(4),
+        "ds" | "double_sphere" | "eucm" | "extended_unified" => Some(2),
+        "omni" | "omnidirectional" | "omnidir" | "mei" => Some(5),
+        "fov" | "atan" | "field_of_view" => Some(1),
         _ => None,
     }
 }
@@ -133,7 +136,11 @@ mod tests {
             let distortion = [used, &vec![0.0; zeros]].concat();
             CameraInfo { model: model.to_string(), distortion, ..info() }
         };
-        let cases: [(&str, &[f64]); 4] = [
+        let cases: [(&str, &[f64]); 8] = [
+            ("ds", &[-0.2, 0.6]),
+            ("eucm", &[0.6, 1.1]),
+            ("omni", &[0.9, 0.1, -0.02, 0.001, 0.002]),
+            ("fov", &[0.9]),
             ("plumb_bob", &[0.1, -0.2, 0.001, 0.002, 0.03]),
             ("rational_polynomial", &[0.1, -0.2, 0.001, 0.002, 0.03, 0.3, 0.2, 0.1]),
             ("equidistant", &[0.1, -0.2, 0.01, 0.02]),

@@ -6,10 +6,10 @@ use vice_core::error::DataError;
 use vice_core::suspicion::Suspicion;
 use vice_core::time::Stamp;
 
-use crate::container::{Locator, Message, Recording, Topic, Visitor, Want};
+use crate::container::{Encoding, Locator, Message, Recording, Topic, Visitor, Want};
 use crate::doubts::DAMAGED;
 use crate::message::{
-    PoseKind, camera_info, compressed_head, framed_pose, image_head, pose_covariance, tf_message,
+    PoseKind, camera_info, compressed_head, framed_pose, image_head, path, pose_covariance, tf_message,
 };
 use crate::namespaces::Spaces;
 use crate::pixels::Packing;
@@ -26,6 +26,8 @@ pub(crate) struct Index {
     pub(crate) images: BTreeMap<usize, ImageTopic>,
     pub(crate) poses: BTreeMap<usize, PoseTopic>,
     pub(crate) infos: BTreeMap<usize, InfoTopic>,
+    /// The last message of each topic with paths.
+    paths: BTreeMap<usize, LastPath>,
     /// The tf of each namespace that has some.
     pub(crate) spaces: Spaces,
     /// The URDFs that robots published.
@@ -36,6 +38,14 @@ pub(crate) struct Index {
     /// By the number of the topic, of those that can be read.
     roles: BTreeMap<usize, Role>,
     stamps: Stamps,
+}
+
+/// The last message of a topic with paths, not decoded before it is known to be the last: each repeats the one before.
+#[derive(Debug, Default)]
+struct LastPath {
+    bytes: Vec<u8>,
+    encoding: Option<Encoding>,
+    locator: Option<Locator>,
 }
 
 /// A pass over the messages of some topics.
@@ -112,6 +122,13 @@ impl Index {
                     }
                 })?;
             }
+            // The last one holds the way as its author saw it in the end.
+            Role::Pose(PoseKind::Path) => {
+                let path = self.paths.entry(message.topic).or_default();
+                path.bytes.clear();
+                path.bytes.extend_from_slice(message.bytes);
+                (path.encoding, path.locator) = (Some(message.encoding), Some(message.locator));
+            }
             Role::Pose(kind) => {
                 let pose = framed_pose(r, kind)?;
                 let said = pose_covariance(r);
@@ -152,6 +169,22 @@ impl Index {
             }
         }
         Ok(())
+    }
+
+    /// Takes in what only the last message of a topic says. Asked once, after the pass.
+    pub(crate) fn finish(&mut self) {
+        for (topic, last) in std::mem::take(&mut self.paths) {
+            let (Some(encoding), Some(locator)) = (last.encoding, last.locator) else { continue };
+            let poses = &mut self.poses;
+            let read = Reader::new(&last.bytes, encoding).and_then(|mut r| {
+                path(&mut r, |pose| {
+                    poses.entry(topic).or_insert_with(|| PoseTopic::new(&pose)).add(pose.header.stamp, &pose);
+                })
+            });
+            if let Err(e) = read {
+                self.broken.entry(topic).or_insert((e.0, locator, 1));
+            }
+        }
     }
 
     /// One doubt for each topic with messages that could not be decoded.

@@ -98,6 +98,8 @@ pub(crate) enum PoseKind {
     WithChild,
     /// `geometry_msgs/PoseStamped` and `PoseWithCovarianceStamped`: header, pose.
     Alone,
+    /// `nav_msgs/Path`: the way so far, published again and again as it grows.
+    Path,
 }
 
 impl PoseKind {
@@ -106,6 +108,7 @@ impl PoseKind {
         match kind {
             "nav_msgs/Odometry" | "geometry_msgs/TransformStamped" => Some(Self::WithChild),
             "geometry_msgs/PoseStamped" | "geometry_msgs/PoseWithCovarianceStamped" => Some(Self::Alone),
+            "nav_msgs/Path" => Some(Self::Path),
             _ => None,
         }
     }
@@ -116,7 +119,7 @@ pub(crate) fn framed_pose<'a>(r: &mut Reader<'a>, kind: PoseKind) -> WireResult<
     let header = r.header()?;
     let child = match kind {
         PoseKind::WithChild => r.str()?.trim_start_matches('/'),
-        PoseKind::Alone => "",
+        PoseKind::Alone | PoseKind::Path => "",
     };
     Ok(FramedPose { header, child, parent_from_child: transform(r)? })
 }
@@ -125,6 +128,18 @@ pub(crate) fn framed_pose<'a>(r: &mut Reader<'a>, kind: PoseKind) -> WireResult<
 /// that end there.
 pub(crate) fn pose_covariance(r: &mut Reader<'_>) -> Option<[f64; 36]> {
     r.f64s().ok()
+}
+
+/// Reads `nav_msgs/Path`: its header, then a pose with a header of its own after the other.
+pub(crate) fn path<'a>(r: &mut Reader<'a>, mut each: impl FnMut(FramedPose<'a>)) -> WireResult<Header<'a>> {
+    let header = r.header()?;
+    for _ in 0..r.count(64)? {
+        let pose = framed_pose(r, PoseKind::Alone)?;
+        // Many publishers name the frame of the whole path only.
+        let frame = if pose.header.frame.is_empty() { header.frame } else { pose.header.frame };
+        each(FramedPose { header: Header { frame, ..pose.header }, ..pose });
+    }
+    Ok(header)
 }
 
 /// Reads `tf2_msgs/TFMessage`, one transform after the other.

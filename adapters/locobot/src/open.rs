@@ -53,6 +53,7 @@ pub(crate) fn open(path: &Path, options: &OpenOptions) -> DataResult<RosDataset>
     let mut index = Index::new(settings.stamps()?);
     let scan = recording.scan(&mut index)?;
     doubts.say_all(damage(scan.damage));
+    index.finish();
     doubts.say_all(index.broken(&recording, &scan.topics));
     let topics = scan.topics;
     doubts.say_all(unread(&topics));
@@ -244,7 +245,7 @@ fn not_a_recording(path: &Path) -> DataError {
 
 /// Whether a topic has images, transforms or poses, by its type.
 fn is_of_use(topic: &Topic) -> bool {
-    let known = ["/Image", "/CompressedImage", "/TFMessage", "/tfMessage", "/Odometry", "Stamped"];
+    let known = ["/Image", "/CompressedImage", "/TFMessage", "/tfMessage", "/Odometry", "Stamped", "/Path"];
     known.iter().any(|k| topic.kind.ends_with(k))
 }
 

@@ -101,7 +101,7 @@ fn depth_images_and_their_differences_are_written() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("depth");
     let at = "1403715280562142976";
-    let said = good(vice(&["depth", text(&data), "--at", at, "--source", "floor,zmap", "--out", text(&out)]));
+    let said = good(vice(&["depth", text(&data), "--at", at, "--depth", "floor,zmap", "--out", text(&out)]));
     assert!(said.contains("floor - zmap over"), "{said}");
     for name in [
         "floor.png",
@@ -115,9 +115,9 @@ fn depth_images_and_their_differences_are_written() {
         assert!(out.join(name).metadata().unwrap().len() > 1000, "{name}");
     }
     let labels = data.join("labels/floor.csv");
-    let args = ["depth", "compare", text(&data), "--labels", text(&labels), "--source", "floor,zmap"];
+    let args = ["depth", "compare", text(&data), "--labels", text(&labels), "--depth", "floor,zmap"];
     assert!(good(vice(&args)).contains("over 8 of 8 key points"));
-    let wrong = vice(&["depth", text(&data), "--at", "7000", "--source", "floor", "--out", text(&out)]);
+    let wrong = vice(&["depth", text(&data), "--at", "7000", "--depth", "floor", "--out", text(&out)]);
     assert_eq!(wrong.code, 1);
     assert!(wrong.stderr.contains("nearest frame"), "{}", wrong.stderr);
 }

@@ -83,7 +83,7 @@ fn information_and_images_through_plugins() {
     let depth = |name: &str, more: &[&str]| {
         let out = folder.path().join(name);
         let args =
-            ["depth", text(&data), "--at", "1403715280562142976", "--source", "floor", "--out", text(&out)];
+            ["depth", text(&data), "--at", "1403715280562142976", "--depth", "floor", "--out", text(&out)];
         let run = vice(&[&args[..], more].concat());
         assert_eq!(run.code, 0, "{}", run.stderr);
         ["image.png", "floor.npy"].map(|f| std::fs::read(out.join(f)).unwrap())

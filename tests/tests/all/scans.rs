@@ -155,7 +155,7 @@ fn a_second_camera_sees_what_the_cloud_says() {
     let Some(euroc) = shared("data/euroc_v1_01") else { return };
     let (dataset, labels) =
         (euroc.display().to_string(), euroc.join("labels/board.csv").display().to_string());
-    let args = ["depth", "compare", &dataset, "--labels", &labels, "--source", "zmap,stereo", "--json", "-"];
+    let args = ["depth", "compare", &dataset, "--labels", &labels, "--depth", "zmap,stereo", "--json", "-"];
     let run = vice(&args);
     assert_eq!(run.code, 0, "{}", run.stderr);
     let document: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
@@ -169,6 +169,6 @@ fn a_second_camera_sees_what_the_cloud_says() {
     assert!(points.len() >= 4 && off.len() == points.len(), "{} of {}", off.len(), points.len());
     // 2 % at two metres is half a pixel between the cameras; the cloud itself is made of such pairs.
     assert!(off[off.len() / 2] < 0.02 && off[off.len() - 1] < 0.04, "{off:?}");
-    let run = vice(&["depth", &dataset, "--at", "0", "--source", "stereo", "--out", "never"]);
+    let run = vice(&["depth", &dataset, "--at", "0", "--depth", "stereo", "--out", "never"]);
     assert!(run.code != 0 && run.stderr.contains("is of single points"), "{}", run.stderr);
 }

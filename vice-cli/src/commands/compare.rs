@@ -56,6 +56,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     for path in &args.results {
         runs.push((run_name(path, &runs), result::read(path)?));
     }
+    result::check_unmixed(runs.iter().map(|(_, document)| document))?;
     let by = args.by.unwrap_or_else(|| By::usual(&runs));
     let document = Document::of(&runs, by, args.seed, &|problem| tracing::warn!("{problem}"));
     if document.comparisons.is_empty() {

@@ -16,8 +16,8 @@ use crate::terminal::{self, Outcome, Verbosity, usage, with_progress};
 #[derive(Debug, clap::Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 #[command(after_help = "Examples:\n  \
-    vice depth V1_01_easy --at 1403715280562142976 --source floor,zmap --out depth_out\n  \
-    vice depth compare V1_01_easy --labels floor.csv --source floor,zmap")]
+    vice depth V1_01_easy --at 1403715280562142976 --depth floor,zmap --out depth_out\n  \
+    vice depth compare V1_01_easy --labels floor.csv --depth floor,zmap")]
 pub(crate) struct Args {
     // Before the subcommand, which is taken out of the matches when it is read.
     #[command(flatten)]

@@ -11,7 +11,7 @@ use crate::terminal::{self, Outcome};
 
 /// Arguments of `vice depth compare`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example: vice depth compare V1_01_easy --labels floor.csv --source floor,zmap")]
+#[command(after_help = "Example: vice depth compare V1_01_easy --labels floor.csv --depth floor,zmap")]
 pub(crate) struct Args {
     #[command(flatten)]
     dataset: DatasetArgs,

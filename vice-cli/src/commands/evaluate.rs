@@ -11,6 +11,7 @@ use vice_run::request::Scoring;
 use vice_run::require::{Requirement, broken};
 use vice_run::result::{MAX_SKIPPED_PERCENT, ResultDocument};
 
+use super::evaluate_rig::{self, Files};
 use super::report::shots;
 use crate::inputs::{EvaluationArgs, on_off};
 use crate::outputs::Outputs;
@@ -22,6 +23,7 @@ use crate::terminal::{self, Outcome, Verbosity, usage, with_progress};
     vice evaluate V1_01_easy --labels floor.csv --estimate imu-euler,openvins.txt --depth floor,zmap\n  \
     vice evaluate my_run --labels labels.json --estimate rel:odometry.txt --reference none --depth zcam --json out.json\n  \
     vice evaluate my_run --labels auto --estimate odom --depth zcam   (labels without a hand)\n  \
+    vice evaluate my_run --camera cam0,cam1 --labels labels_{camera}.csv --estimate odom   (each camera, and together)\n  \
     vice evaluate --request out.json   (asks once more what out.json is the answer to)\n\n\
     Lists repeat the option or take commas. Estimates are names of the data set's streams, `imu-euler` (Euler\n\
     integration of its IMU from the reference state at the first key frame), or files: TUM, EuRoC CSV, KITTI with a\n\
@@ -103,6 +105,15 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     let subsets = args.scoring.subsets.iter().map(|n| usize::from(*n)).collect();
     let mut request = args.evaluation.request(Scoring { subsets, align: args.scoring.align })?;
     request.depth.compare = args.scoring.depth_check.or(request.depth.compare);
+    if let Some(each) = request.of_each_camera()? {
+        if samples.is_some() {
+            return Err(usage("--samples jsonl is of one camera, and several are asked"));
+        }
+        let OutputArgs { json, csv, latex, report, .. } = files;
+        let files = Files { json, csv, latex, report, samples: files.samples != SamplesTo::None };
+        let document = evaluate_rig::run(&request, each, &files, verbosity)?;
+        return Ok(judged(&document.cameras, args, verbosity));
+    }
     let outputs =
         Outputs::new(&[&files.json, &files.csv, &files.latex, &files.report, &samples], &request.inputs())?;
     let opened = request.open()?;
@@ -140,10 +151,22 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         // The table has them in it.
         terminal::warn(document.suspicions.iter());
     }
-    let skips = judge_skips(&document, args.scoring.max_skipped, verbosity);
-    let broken = broken(&args.scoring.require, &document.pixel);
-    broken.iter().for_each(|line| tracing::error!("{line}"));
-    Ok(if broken.is_empty() { skips } else { Outcome::RequirementBroken })
+    Ok(judged(std::slice::from_ref(&document), args, verbosity))
+}
+
+/// Whether enough was scored, and the limits are kept, in the results of all cameras.
+fn judged(documents: &[ResultDocument], args: &Args, verbosity: Verbosity) -> Outcome {
+    let (mut skips, mut limits) = (Outcome::Done, Outcome::Done);
+    for document in documents {
+        if matches!(judge_skips(document, args.scoring.max_skipped, verbosity), Outcome::TooManySkips) {
+            skips = Outcome::TooManySkips;
+        }
+        for line in broken(&args.scoring.require, &document.pixel) {
+            tracing::error!("{line}");
+            limits = Outcome::RequirementBroken;
+        }
+    }
+    if matches!(limits, Outcome::RequirementBroken) { limits } else { skips }
 }
 
 /// Whether enough was scored.

@@ -15,6 +15,7 @@ pub(crate) mod depth;
 pub(crate) mod depth_compare;
 pub(crate) mod diagnose;
 pub(crate) mod evaluate;
+mod evaluate_rig;
 pub(crate) mod floor;
 pub(crate) mod formats;
 pub(crate) mod info;

@@ -40,6 +40,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     let out = Some(args.out.clone());
     let outputs = Outputs::new(&[&out], &inputs)?;
     let documents: Vec<ResultDocument> = args.results.iter().map(result::read).collect::<Result<_, _>>()?;
+    result::check_unmixed(&documents)?;
     // The data sets are inputs too, which only the documents name.
     let named: Vec<PathBuf> = documents.iter().map(|d| d.request.dataset.path.clone()).collect();
     Outputs::new(&[&out], &named)?;

@@ -80,8 +80,8 @@ pub(crate) struct DepthArgs {
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct SourceArgs {
     /// Depth sources: floor, zmap, zcam, mesh, tag, stereo.
-    #[arg(long, value_name = "SOURCE,...", required = true)]
-    source: Vec<String>,
+    #[arg(long, alias = "source", value_name = "SOURCE,...", required = true)]
+    depth: Vec<String>,
 }
 
 /// What places the camera in the world, where nothing is evaluated.
@@ -163,7 +163,7 @@ impl CalibrationArgs {
 
 impl SourceArgs {
     pub(crate) fn spec(&self, depth: &DepthArgs) -> anyhow::Result<DepthSpec> {
-        let spec = depth.spec("--source", &self.source)?;
+        let spec = depth.spec("--depth", &self.depth)?;
         spec.check(&[])?;
         Ok(spec)
     }

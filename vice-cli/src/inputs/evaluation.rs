@@ -74,7 +74,8 @@ pub(crate) struct EvaluationArgs {
     window: WindowArgs,
     #[command(flatten)]
     streams: StreamArgs,
-    /// Depth sources: floor, zmap, zcam, mesh, tag, stereo [default: floor].
+    /// Depth sources: floor, zmap, zcam, mesh, tag, stereo; or triangulated, alone: from half of the labels and the stream's own
+    /// motion [default: floor].
     #[arg(long, value_name = "SOURCE,...", help_heading = "Depth")]
     depth: Vec<String>,
     #[command(flatten)]

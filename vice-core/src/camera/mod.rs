@@ -24,6 +24,7 @@
 //! Jacobian: solved to [`UNPROJECT_TOLERANCE`] or an error.
 
 mod batch;
+mod derivative;
 mod double_sphere;
 mod equidistant;
 mod extended_unified;

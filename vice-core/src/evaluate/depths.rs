@@ -9,12 +9,17 @@ use crate::depth::{DepthMiss, DepthSample, DepthSource, Keyframe};
 use crate::error::{DataResult, one_line};
 use crate::frames::BodyFromCamera;
 use crate::suspicion::Suspicion;
+use crate::triangulate::TriangulatedDepth;
 
 /// Depths at the key frames of one source.
 pub(super) struct DepthTable {
     /// By point and segment; `None` where it was not asked.
     by_segment: Vec<Vec<Option<Depth>>>,
+    /// The same with what is known of triangulated depths; empty for all other sources.
+    triangulated: Vec<Vec<Option<Triangulated>>>,
 }
+
+type Triangulated = Result<TriangulatedDepth, DepthMiss>;
 
 type Depth = Result<DepthSample, DepthMiss>;
 
@@ -22,6 +27,23 @@ impl DepthTable {
     /// Of a point's segment; `None` where it was not asked.
     pub(super) fn get(&self, point: usize, segment: usize) -> Option<Depth> {
         *self.by_segment.get(point)?.get(segment)?
+    }
+
+    /// Depths that labels gave.
+    pub(super) fn triangulated(triangulated: Vec<Vec<Option<Triangulated>>>) -> Self {
+        let depth = |found: &Option<Triangulated>| found.map(|found| found.map(|f| DepthSample::new(f.z_m)));
+        let by_segment = triangulated.iter().map(|point| point.iter().map(depth).collect()).collect();
+        Self { by_segment, triangulated }
+    }
+
+    /// What is known of a triangulated depth.
+    pub(super) fn triangulation(&self, point: usize, segment: usize) -> Option<&TriangulatedDepth> {
+        self.triangulated.get(point)?.get(segment)?.as_ref()?.as_ref().ok()
+    }
+
+    /// All that were triangulated, or why they have no depth.
+    pub(super) fn found(&self) -> impl Iterator<Item = &Triangulated> {
+        self.triangulated.iter().flatten().flatten()
     }
 }
 
@@ -55,6 +77,11 @@ impl<'a> SourceDepths<'a> {
         let tables: Result<_, _> =
             asked.iter().map(|poses| keyframe_depths(evaluation, source, cameras, poses)).collect();
         Ok(Self { source, tables: tables? })
+    }
+
+    /// Triangulated by each stream for itself.
+    pub(super) const fn triangulated(source: &'a dyn DepthSource, tables: Vec<DepthTable>) -> Self {
+        Self { source, tables }
     }
 
     /// For a stream, by its index.
@@ -124,5 +151,5 @@ pub(super) fn keyframe_depths(
             by_segment[point][segment] = Some(depth);
         }
     }
-    Ok(DepthTable { by_segment })
+    Ok(DepthTable { by_segment, triangulated: vec![] })
 }

@@ -27,17 +27,20 @@ mod spread;
 mod streams;
 #[cfg(feature = "serde")]
 pub(crate) mod trial;
+mod triangulated;
 mod windows;
 
 pub use input::{DEFAULT_MAX_GAP, Evaluation, EvaluationBuilder};
 pub use rig::{DatasetRig, FixedRig, Rig};
 pub use select::{Observations, SelectedKeyframe, Selection, Window};
 pub use streams::Stream;
+pub use triangulated::TriangulatedDepth;
 
 use depth_doubts::{OtherDepths, depth_doubts};
 use depths::{DepthTable, SourceDepths};
 use score::Scorer;
 use streams::PosesAtFrames;
+use triangulated::Split;
 use windows::Windows;
 
 use crate::error::{DataError, DataResult};
@@ -124,6 +127,9 @@ pub enum EvaluateError {
         /// A unit that may be mixed up.
         suspicion: Option<String>,
     },
+    /// Triangulated depth and another one were asked for together.
+    #[error("triangulated depth is fitted to each stream's own motion and cannot stand beside other depths")]
+    MixedDepths,
     /// The scored samples could not be handed on.
     #[error("the samples cannot be written")]
     Samples(#[source] std::io::Error),
@@ -164,6 +170,17 @@ fn run(
     progress: &(dyn Fn(usize, usize) + Sync),
     mut sink: Option<&mut SampleSink<'_>>,
 ) -> Result<Evaluated, EvaluateError> {
+    let split = match (evaluation.depths, evaluation.checks) {
+        ([only], []) if only.needs_track() => Some(Split::of(evaluation.selection)),
+        (depths, checks) if depths.iter().chain(checks).any(|d| d.needs_track()) => {
+            return Err(EvaluateError::MixedDepths);
+        }
+        _ => None,
+    };
+    let evaluation = &match &split {
+        Some(split) => Evaluation { selection: &split.scored, ..*evaluation },
+        None => *evaluation,
+    };
     let selection = evaluation.selection;
     let sizes = subset_sizes(evaluation.subsets, selection.point_count())?;
     let frames_range = selection.stamp_range(evaluation.frames).ok_or(EvaluateError::EmptyWindow)?;
@@ -199,7 +216,13 @@ fn run(
     };
     let mut known = Vec::with_capacity(sources);
     for source in evaluation.depths {
-        known.push(SourceDepths::ask(evaluation, *source, &cameras, &placing)?);
+        known.push(match &split {
+            Some(split) => {
+                let by = |poses| split.depths(evaluation, &cameras, poses);
+                SourceDepths::triangulated(*source, poses.iter().map(by).collect())
+            }
+            None => SourceDepths::ask(evaluation, *source, &cameras, &placing)?,
+        });
         step();
     }
     for source in evaluation.checks {
@@ -233,6 +256,8 @@ fn run(
             let about = format!("{}, {} depth", stream.name, source.name());
             suspicions.extend(spread::suspicions(&about, &spread, samples));
             let doubts = match &by_reference {
+                // A depth that was fitted to the labels fits them.
+                _ if split.is_some() => vec![],
                 Some(doubts) => Vec::clone(doubts),
                 None => {
                     let (doubts, common) = depth_doubts(&scorer, &scored, &others(&known, place, index));
@@ -266,6 +291,7 @@ fn run(
                 skipped: scored.skipped,
                 keyframes: scored.keyframes,
                 depth_doubts: doubts,
+                triangulation: split.as_ref().map(|split| split.part(known[place].of(index))),
                 samples: scored.samples,
             });
             room = std::mem::take(&mut scored.columns);

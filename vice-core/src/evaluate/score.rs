@@ -8,6 +8,7 @@ use super::columns::{Columns, Scratch, median_residual};
 use super::runs::index;
 use super::select::{SelectedPoint, SelectedSegment};
 use super::streams::PosesAtFrames;
+use super::triangulated::part_of;
 use super::windows::Windows;
 use super::{DepthTable, Evaluation, SkipReason, skip};
 use crate::camera::Pixel;
@@ -184,6 +185,7 @@ impl<'a> Scorer<'a> {
             depth_z_m: lifted.z_m,
             point_world_m: Some(lifted.at_keyframe.transform_point(&lifted.point_camera_m).coords.into()),
             on_edge: lifted.on_edge,
+            triangulated: self.depths.triangulation(place, number).map(part_of),
         });
         self.carry(point, segment, &lifted, scratch);
         let Scratch { carried, .. } = &*scratch;

@@ -16,6 +16,7 @@ use crate::result::Role;
 use crate::time::Span;
 use crate::trajectory::{Trajectory, in_other_world};
 
+mod triangulated;
 mod verdict;
 
 struct Flyer {

@@ -114,14 +114,14 @@ def convert_labels(source: Any, out: Any, **options: Any) -> str:
     return _run(["labels", "convert"], [source, out], options)
 
 
-def depth(run: Any, out: Any, *, at: Any, source: Any, **options: Any) -> str:
+def depth(run: Any, out: Any, *, at: Any, depth: Any, **options: Any) -> str:
     """Depth images of a frame from each source, in a folder."""
-    return _run(["depth"], [run], {"out": out, "at": at, "source": source, **options})
+    return _run(["depth"], [run], {"out": out, "at": at, "depth": depth, **options})
 
 
-def depth_compare(run: Any, labels: Any, *, source: Any, **options: Any) -> str:
+def depth_compare(run: Any, labels: Any, *, depth: Any, **options: Any) -> str:
     """Depths of two or more sources at labelled key points, and what a difference costs in pixels."""
-    return _run(["depth", "compare"], [run], {"labels": labels, "source": source, **options})
+    return _run(["depth", "compare"], [run], {"labels": labels, "depth": depth, **options})
 
 
 def detect_labels(run: Any, out: Any, **options: Any) -> str:

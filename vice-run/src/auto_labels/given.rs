@@ -27,11 +27,9 @@ impl Givens {
         let place = Place::of_file(file)?;
         let read = place.told(labels::read_file(place.path(), Some(&opened.frames)))?;
         let shown = address::shown_path(file);
+        let read = read.of_camera(&opened.camera_name).map_err(|e| e.at(&shown))?;
         read.check_image_size(opened.camera.width(), opened.camera.height()).map_err(|e| e.at(&shown))?;
         let wrong = |what: String| RunError::usage("from", format!("{}: {what}", shown.display()));
-        if let Some(camera) = read.labels.camera.as_ref().filter(|c| **c != opened.camera_name) {
-            return Err(wrong(format!("labels of camera {camera}, not {}", opened.camera_name)));
-        }
         for point in read.labels.points() {
             if let Some(o) = point.observations.iter().find(|o| !opened.camera.contains(o.px)) {
                 return Err(wrong(format!(

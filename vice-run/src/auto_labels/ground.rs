@@ -55,6 +55,7 @@ impl<'a> Grounds<'a> {
     /// # Errors
     /// [`crate::error::RunError`] if a source is asked for that the recording has not.
     pub(super) fn new(spec: &DepthSpec, scene: &'a Scene) -> RunResult<Self> {
+        spec.check_of_frames()?;
         let opened = &scene.opened;
         let mut grounds = Self { scene, source: None, surface: None, without: None, any: OnceLock::new() };
         let has_depth = opened.dataset.has_depth(&opened.camera_name);

@@ -71,6 +71,13 @@ impl Manifest {
         if rows.is_empty() {
             return Err(DataError::of_kind(ErrorKind::Usage, "holds no run"));
         }
+        if let Some(other) = rows
+            .iter()
+            .find(|row| row.request.depth.is_triangulated() != rows[0].request.depth.is_triangulated())
+        {
+            let problem = "triangulated depth cannot stand beside other depths in one table: it takes a part of the error for depth";
+            return Err(wrong(other.line, problem).hint("make a batch of its own of these runs"));
+        }
         let mut names = BTreeSet::new();
         for row in &rows {
             if !names.insert(row.run_id.as_str()) {
@@ -181,6 +188,10 @@ mod tests {
         assert!(error("m.csv", "dataset,fps\nd\n").starts_with("m.csv:2: has 1 cells under 2 columns"));
         assert!(error("m.csv", "dataset,align\nd,up\n").starts_with("m.csv:2: align: unknown variant `up`"));
         assert!(error("m.csv", "dataset,zcam-range\nd,\"1,2\"\n").starts_with("m.csv:2: zcam-range: "));
+        assert!(
+            error("m.csv", "dataset,depth\nd,floor\ne,triangulated\n")
+                .starts_with("m.csv:3: triangulated depth cannot stand beside other depths")
+        );
         assert!(error("m.csv", "dataset\nd\nd\n").starts_with("m.csv:3: there is another run `d`"));
         assert!(error("m.csv", "dataset\nno/*\n").starts_with("m.csv:2: dataset no/* stands for nothing"));
         assert!(error("m.toml", "\n[[run]]\nfsp = 1\n").starts_with("m.toml:3: there is no column `fsp`"));

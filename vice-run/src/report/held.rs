@@ -1,6 +1,6 @@
 //! RMSE_2D of the labels that hold, its interval, and the error by age: rows that the table, the page and the CSV share.
 
-use vice_core::result::{Figure, HeldPart, PixelPart, TrajectoryPart, WindowPart};
+use vice_core::result::{Figure, HeldPart, PixelPart, TrajectoryPart, TriangulationPart, WindowPart};
 
 use super::rows::{decimals, pixels};
 use crate::result::{OWN_ANCHOR, ResultDocument};
@@ -79,7 +79,26 @@ pub(crate) fn remarks(part: &PixelPart) -> Vec<String> {
         let n = part.depth_doubts.len();
         remarks.push(format!("{about}: the depth is doubtful at {n} of {} key frames", part.keyframes.len()));
     }
+    if let Some(told) = &part.triangulation {
+        remarks.push(format!("{about}: {}", printable(&triangulation(told))));
+    }
     remarks
+}
+
+/// How the depths came about, where labels gave them, and what they cannot show.
+fn triangulation(told: &TriangulationPart) -> String {
+    let sure =
+        told.median_sigma_share.zip(told.median_parallax_deg).map_or_else(String::new, |(share, deg)| {
+            format!(" (median: {:.1} % sure, {deg:.1} degrees of parallax)", 100.0 * share)
+        });
+    let without = match told.keyframes_without_depth {
+        0 => String::new(),
+        n => format!(", {n} have none"),
+    };
+    format!(
+        "{} labels give the depth of {} key frames{sure}{without}: {}. {}",
+        told.labels_for_depth, told.keyframes, told.rule, told.cannot_show
+    )
 }
 
 /// How many poses the trajectory errors of an estimate rest on.

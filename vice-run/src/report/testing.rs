@@ -33,6 +33,7 @@ pub(crate) fn keyframe(point: &str, stamp_ns: i64) -> KeyframePart {
         depth_z_m: 2.0,
         point_world_m: None,
         on_edge: false,
+        triangulated: None,
     }
 }
 
@@ -53,6 +54,7 @@ pub(crate) fn part(stream: &str, samples: &[Sample]) -> PixelPart {
         skipped: vec![],
         keyframes: vec![],
         depth_doubts: vec![],
+        triangulation: None,
         samples: samples.to_vec(),
     }
 }

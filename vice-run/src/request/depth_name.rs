@@ -22,11 +22,14 @@ pub enum DepthName {
     Tag,
     /// A second camera.
     Stereo,
+    /// The later labels of the point, by the motion of each stream.
+    Triangulated,
 }
 
 impl DepthName {
     /// All sources.
-    pub const ALL: [Self; 6] = [Self::Floor, Self::ZMap, Self::ZCam, Self::Mesh, Self::Tag, Self::Stereo];
+    pub const ALL: [Self; 7] =
+        [Self::Floor, Self::ZMap, Self::ZCam, Self::Mesh, Self::Tag, Self::Stereo, Self::Triangulated];
 
     /// The name in requests, tables and documents.
     pub const fn name(self) -> &'static str {
@@ -37,6 +40,7 @@ impl DepthName {
             Self::Mesh => "mesh",
             Self::Tag => "tag",
             Self::Stereo => "stereo",
+            Self::Triangulated => "triangulated",
         }
     }
 }
@@ -106,8 +110,7 @@ mod tests {
             assert_eq!(name.name().parse(), Ok(name));
             assert_eq!(serde_json::to_string(&name).unwrap(), format!("\"{name}\""));
         }
-        assert!(
-            "sonar".parse::<DepthName>().unwrap_err().contains("known: floor, zmap, zcam, mesh, tag, stereo")
-        );
+        let error = "sonar".parse::<DepthName>().unwrap_err();
+        assert!(error.contains("known: floor, zmap, zcam, mesh, tag, stereo, triangulated"), "{error}");
     }
 }

@@ -382,7 +382,7 @@ fn beside(data_set: &Path) -> Vec<PathBuf> {
     let told = ViceToml::read(&file).unwrap_or_default();
     let labels = told.labels.file.filter(|file| !is_auto(file));
     let streams = told.streams.into_values().flat_map(|s| std::iter::once(s.file).chain(s.times));
-    let named = told.calibration.into_iter().chain(told.cloud).chain(labels);
+    let named = told.calibration.into_iter().chain(told.cloud).chain(told.mesh).chain(labels);
     std::iter::once(file).chain(named).chain(streams).collect()
 }
 
@@ -443,12 +443,39 @@ impl DepthSpec {
         Ok(())
     }
 
+    /// Whether the labels give the depth.
+    pub fn is_triangulated(&self) -> bool {
+        self.sources.contains(&DepthName::Triangulated)
+    }
+
+    /// Refuses a source that needs labels and a pose stream, where frames are asked for their depth by themselves.
+    ///
+    /// # Errors
+    /// [`RunError`] of the kind usage.
+    pub fn check_of_frames(&self) -> RunResult<()> {
+        if !self.is_triangulated() {
+            return Ok(());
+        }
+        let problem = "triangulated depth is fitted to labels and to the stream under test: only `vice evaluate` has it";
+        Err(RunError::usage("depth", problem).advise("choose another source here"))
+    }
+
+    /// Refuses triangulated depth beside any other: it takes a part of the error for depth, and so is no depth to compare.
+    fn check_unmixed(&self) -> RunResult<()> {
+        if self.is_triangulated() && (self.sources.len() > 1 || self.compare == Some(true)) {
+            let problem = "triangulated depth takes a part of the error for depth, and cannot stand beside other depths";
+            return Err(RunError::usage("depth", problem).advise("ask for it alone, in a run of its own"));
+        }
+        Ok(())
+    }
+
     /// Refuses settings of sources that nobody asks for, here or in `also`.
     ///
     /// # Errors
     /// [`RunError`] of the kind usage.
     pub fn check(&self, also: &[DepthName]) -> RunResult<()> {
         use DepthName::{Stereo, Tag, ZCam, ZMap};
+        self.check_unmixed()?;
         let settings = [
             ("zmap-occlusion", self.zmap_occlusion.is_some(), ZMap),
             ("zmap-interpolation", self.zmap_interpolation.is_some(), ZMap),

@@ -8,6 +8,7 @@ mod read;
 mod version_1;
 
 use serde::{Deserialize, Serialize};
+use vice_core::error::ErrorKind;
 use vice_core::result::{DatasetPart, Evaluated, PathPart, PixelPart, TrajectoryPart, worst_skipped_percent};
 use vice_core::suspicion::Suspicions;
 
@@ -15,11 +16,15 @@ use read::parse;
 pub use read::read;
 pub(crate) use read::read_bytes;
 
+use crate::error::{RunError, RunResult};
 use crate::request::Request;
 use crate::tracking_summary::TrackingSummary;
 
 /// The schema's name and version.
 pub const SCHEMA: &str = "vice.result/2";
+
+/// The schema of results of several cameras: a list of these documents, with what was asked for.
+pub const SCHEMA_OF_RIGS: &str = "vice.rig/1";
 
 /// Share of labels that may be skipped before `vice evaluate` ends with 3, unless it is told another, percent.
 pub const MAX_SKIPPED_PERCENT: f64 = 10.0;
@@ -48,6 +53,24 @@ pub struct ResultDocument {
     /// What looks wrong in the data but did not stop the evaluation.
     #[serde(default, skip_serializing_if = "Suspicions::is_empty")]
     pub suspicions: Suspicions,
+}
+
+/// Refuses results by triangulated depth beside results by another: it takes a part of the error for depth, so that the
+/// numbers are no comparison.
+///
+/// # Errors
+/// [`RunError`] of the kind usage.
+pub fn check_unmixed<'a>(documents: impl IntoIterator<Item = &'a ResultDocument>) -> RunResult<()> {
+    let (mut with, mut without) = (false, false);
+    for part in documents.into_iter().flat_map(|document| &document.pixel) {
+        with |= part.triangulation.is_some();
+        without |= part.triangulation.is_none();
+    }
+    if with && without {
+        let problem = "results by triangulated depth cannot stand beside other depths: it takes a part of the error for depth";
+        return Err(RunError::new(ErrorKind::Usage, problem).advise("show or compare them apart"));
+    }
+    Ok(())
 }
 
 /// In place of a stream's name where each stream places the camera for its own depth.

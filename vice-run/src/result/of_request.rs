@@ -4,7 +4,7 @@ use std::path::Path;
 
 use vice_core::error::{DataError, DataResult, ErrorKind};
 
-use super::{parse as parse_document, read_bytes};
+use super::{SCHEMA_OF_RIGS, parse as parse_document, read_bytes};
 use crate::error::RunResult;
 use crate::request::Request;
 
@@ -34,6 +34,14 @@ fn parse(text: &[u8]) -> DataResult<Request> {
     let head: Head = serde_json::from_slice(text).map_err(|e| at(e, "is no request: it is not JSON"))?;
     match head.schema {
         None => serde_json::from_slice(text).map_err(|e| at(e, "is a request with a mistake in it")),
+        Some(schema) if schema == SCHEMA_OF_RIGS => {
+            #[derive(serde::Deserialize)]
+            struct Asked {
+                request: Request,
+            }
+            let asked: Result<Asked, _> = serde_json::from_slice(text);
+            asked.map(|asked| asked.request).map_err(|e| at(e, "is a document with a mistake in it"))
+        }
         Some(_) => parse_document(text).map(|document| document.request),
     }
 }

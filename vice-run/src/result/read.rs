@@ -4,7 +4,7 @@ use std::path::Path;
 
 use vice_core::error::{DataError, DataResult, ErrorKind};
 
-use super::{ResultDocument, SCHEMA, version_1};
+use super::{ResultDocument, SCHEMA, SCHEMA_OF_RIGS, version_1};
 
 /// What writes a result document.
 const HINT: &str = "write one with `vice evaluate --json FILE`";
@@ -59,6 +59,11 @@ pub(crate) fn check_schema(schema: &str) -> DataResult<u32> {
             )
             .hint("update VICE"))
         }
+        _ if schema == SCHEMA_OF_RIGS => Err(DataError::of_kind(
+            ErrorKind::Unsupported,
+            "holds the results of several cameras, and one is wanted here",
+        )
+        .hint("its list `cameras` has a result for each; `vice evaluate --camera NAME` writes that of one")),
         _ => Err(DataError::new(format!("is a document of another kind: {schema}, not {SCHEMA}")).hint(HINT)),
     }
 }
@@ -90,6 +95,7 @@ mod tests {
         assert!(error("{\"schema\":\"vice.result/3\"}").contains("newer VICE: it is vice.result/3"));
         assert!(error("{\"schema\":\"vice.trajectory/1\"}").contains("another kind: vice.trajectory/1"));
         assert!(error("{\"schema\":\"vice.result/x\"}").contains("another kind"));
+        assert!(error("{\"schema\":\"vice.rig/1\"}").contains("several cameras"));
         assert!(error("{}").contains("no schema"));
         assert!(error("point,timestamp").contains("not JSON"));
         assert!(error("{\"schema\":\"vice.result/1\"}").contains("mistake"));

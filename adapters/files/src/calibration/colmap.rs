@@ -8,21 +8,29 @@ use super::entry::in_camera_kind;
 use super::{CalibrationFile, CameraOverride};
 
 /// A model of COLMAP: name, how many parameters it has, and where each goes.
-struct Model {
-    name: &'static str,
-    parameters: usize,
+#[derive(Debug, PartialEq, Eq)]
+pub struct ColmapModel {
+    /// As COLMAP writes it.
+    pub name: &'static str,
+    /// How many parameters it has.
+    pub parameters: usize,
     /// The core's name; `None` for those that it has not.
     ours: Option<&'static str>,
     /// Whether there is one focal length for both axes.
     one_focal: bool,
 }
 
-const fn model(name: &'static str, parameters: usize, ours: Option<&'static str>, one_focal: bool) -> Model {
-    Model { name, parameters, ours, one_focal }
+const fn model(
+    name: &'static str,
+    parameters: usize,
+    ours: Option<&'static str>,
+    one_focal: bool,
+) -> ColmapModel {
+    ColmapModel { name, parameters, ours, one_focal }
 }
 
 /// In the order of their numbers in binary files.
-const MODELS: [Model; 18] = [
+const MODELS: [ColmapModel; 18] = [
     model("SIMPLE_PINHOLE", 3, Some("pinhole"), true),
     model("PINHOLE", 4, Some("pinhole"), false),
     model("SIMPLE_RADIAL", 4, Some("radtan"), true),
@@ -84,8 +92,7 @@ fn camera_of_row(words: &[&str]) -> DataResult<CameraOverride> {
         word.parse::<f64>().map_err(|_| DataError::new(format!("the parameter `{word}` is no number")))
     };
     let parameters = parameters.iter().map(number).collect::<DataResult<Vec<f64>>>()?;
-    let model = MODELS.iter().find(|m| m.name == *name).ok_or_else(|| unknown(name))?;
-    camera(model, [side(width)?, side(height)?], &parameters)
+    ColmapModel::by_name(name)?.camera([side(width)?, side(height)?], &parameters)
 }
 
 /// Reads `cameras.bin`.
@@ -114,13 +121,12 @@ pub(super) fn from_bytes(bytes: &[u8]) -> DataResult<CalibrationFile> {
                 .map_err(|_| DataError::new(format!("{value} is no number of pixels")).byte(at as u64))
         };
         let size = [side(at + 8)?, side(at + 16)?];
-        let model =
-            MODELS.get(kind as usize).ok_or_else(|| unknown(&kind.to_string()).byte(at as u64 + 4))?;
+        let model = ColmapModel::by_number(kind).map_err(|e| e.byte(at as u64 + 4))?;
         let first = at + HEAD_BYTES;
         let parameters = (0..model.parameters)
             .map(|i| u64_at(first + 8 * i).map(f64::from_bits))
             .collect::<DataResult<Vec<f64>>>()?;
-        let camera = camera(model, size, &parameters).map_err(|e| in_camera_kind(&id.to_string(), &e))?;
+        let camera = model.camera(size, &parameters).map_err(|e| in_camera_kind(&id.to_string(), &e))?;
         insert(&mut file, &id.to_string(), camera)?;
         at = first + 8 * model.parameters;
     }
@@ -155,32 +161,55 @@ fn unknown(name: &str) -> DataError {
     )
 }
 
-fn camera(model: &Model, size: [u32; 2], parameters: &[f64]) -> DataResult<CameraOverride> {
-    let ours = model.ours.ok_or_else(|| unknown(model.name))?;
-    if parameters.len() != model.parameters {
-        return Err(DataError::new(format!(
-            "{} has {} parameters, not {}",
-            model.name,
-            model.parameters,
-            parameters.len()
-        )));
+impl ColmapModel {
+    /// A model by its number in binary files.
+    ///
+    /// # Errors
+    /// [`DataError`] if COLMAP has none of that number.
+    pub fn by_number(number: u32) -> DataResult<&'static Self> {
+        let found = usize::try_from(number).ok().and_then(|n| MODELS.get(n));
+        found.ok_or_else(|| unknown(&number.to_string()))
     }
-    let (focals, rest) = parameters.split_at(if model.one_focal { 1 } else { 2 });
-    let (centre, lens) = rest.split_at(2);
-    let padded = |length: usize| {
-        let mut all = lens.to_vec();
-        all.resize(length, 0.0);
-        all
-    };
-    let distortion = match ours {
-        "radtan" | "equidistant" => padded(4),
-        _ => lens.to_vec(),
-    };
-    Ok(CameraOverride {
-        model: Some(ours.to_string()),
-        resolution: Some(size),
-        intrinsics: Some([focals[0], focals[focals.len() - 1], centre[0] - 0.5, centre[1] - 0.5]),
-        distortion: Some(distortion),
-        body_from_camera: None,
-    })
+
+    /// A model by its name.
+    ///
+    /// # Errors
+    /// [`DataError`] if COLMAP has none of that name.
+    pub fn by_name(name: &str) -> DataResult<&'static Self> {
+        MODELS.iter().find(|m| m.name == name).ok_or_else(|| unknown(name))
+    }
+
+    /// A camera of the model: its principal point counts from the centre of the first pixel, as all here do.
+    ///
+    /// # Errors
+    /// [`DataError`] for another number of parameters, and for a model that is not projected here.
+    pub fn camera(&self, size: [u32; 2], parameters: &[f64]) -> DataResult<CameraOverride> {
+        let ours = self.ours.ok_or_else(|| unknown(self.name))?;
+        if parameters.len() != self.parameters {
+            return Err(DataError::new(format!(
+                "{} has {} parameters, not {}",
+                self.name,
+                self.parameters,
+                parameters.len()
+            )));
+        }
+        let (focals, rest) = parameters.split_at(if self.one_focal { 1 } else { 2 });
+        let (centre, lens) = rest.split_at(2);
+        let padded = |length: usize| {
+            let mut all = lens.to_vec();
+            all.resize(length, 0.0);
+            all
+        };
+        let distortion = match ours {
+            "radtan" | "equidistant" => padded(4),
+            _ => lens.to_vec(),
+        };
+        Ok(CameraOverride {
+            model: Some(ours.to_string()),
+            resolution: Some(size),
+            intrinsics: Some([focals[0], focals[focals.len() - 1], centre[0] - 0.5, centre[1] - 0.5]),
+            distortion: Some(distortion),
+            body_from_camera: None,
+        })
+    }
 }

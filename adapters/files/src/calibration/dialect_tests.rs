@@ -2,6 +2,8 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
+use vice_core::frames::{Camera as CameraFrame, Rigid};
+
 use super::*;
 
 fn read_as(name: &str, content: &[u8]) -> DataResult<CalibrationFile> {
@@ -325,4 +327,42 @@ fn a_lens_that_two_keys_make_and_no_model_has_is_refused() {
     assert_eq!(file.time_offset_of("cam0"), Some(Span::from_millis(-2)));
     assert_eq!(file.cameras()["cam0"].distortion, Some(vec![0.4, 1.0]));
     assert!(file.suspicions().iter().any(|s| s.line().contains("more")));
+}
+
+#[test]
+fn the_second_camera_of_orb_slam_is_placed_by_the_first() {
+    let first = place();
+    let first_from_second: Rigid<CameraFrame, CameraFrame> = Rigid::from_parts(
+        Vector3::new(0.11, 0.002, -0.001),
+        UnitQuaternion::from_scaled_axis([0.01, -0.02, 0.003].into()),
+    );
+    let lens = |prefix: &str, fx: f64| {
+        format!(
+            "{prefix}.fx: {fx:?}\n{prefix}.fy: 501.0\n{prefix}.cx: 320.0\n{prefix}.cy: 240.0\n{prefix}.k1: 0.01\n{prefix}.k2: 0.0\n{prefix}.k3: 0.0\n{prefix}.k4: 0.0\n"
+        )
+    };
+    let text = format!(
+        "%YAML:1.0\nCamera.type: \"KannalaBrandt8\"\n{}{}Stereo.T_c1_c2: {}Stereo.ThDepth: 60.0\nCamera.width: 640\nCamera.height: 480\nIMU.T_b_c1: {}",
+        lens("Camera1", 500.0),
+        lens("Camera2", 510.0),
+        opencv(&first_from_second.to_row_major()),
+        opencv(&first.to_row_major()),
+    );
+    let file = read_as("stereo.yaml", text.as_bytes()).unwrap();
+    for (name, fx, expected) in [("cam0", 500.0, first), ("cam1", 510.0, first * first_from_second)] {
+        let camera = file.camera(name, None).unwrap().unwrap();
+        assert_eq!(
+            (camera.fx_fy_cx_cy()[0], camera.width(), camera.model().name()),
+            (fx, 640, "equidistant")
+        );
+        let off = file.body_from_camera(name).unwrap().inverse() * expected;
+        assert!(off.translation().norm() < 1e-12, "{name}");
+        assert!(vice_core::frames::rotation_angle_rad(&off.rotation()) < 1e-12, "{name}");
+    }
+    // Without the place of the second nobody guesses it.
+    let without: String = text.split("Stereo.T_c1_c2").next().unwrap().to_string();
+    let file = read_as("stereo.yaml", format!("{without}Camera.width: 640\nCamera.height: 480\n").as_bytes())
+        .unwrap();
+    assert!(file.body_from_camera("cam1").is_none());
+    assert_eq!(file.cameras().len(), 2);
 }

@@ -9,7 +9,7 @@ use vice_core::time::Span;
 use super::entry::{Entry, in_camera_kind, list, one, side};
 use super::keys::{self, Key};
 use super::lens::{self, Numbers};
-use super::{CalibrationFile, CameraOverride, basalt, in_camera, tree};
+use super::{CalibrationFile, CameraOverride, basalt, in_camera, orb_slam, tree};
 use crate::rigid_file::Matrix4;
 
 /// How far two statements of the same transform may be apart: metres and radians.
@@ -23,6 +23,17 @@ pub(super) fn parse(text: &str) -> DataResult<CalibrationFile> {
             add(&mut file, &format!("cam{number}"), entry);
         }
         file.unused.extend(basalt::unused(calibration));
+        return Ok(file);
+    }
+    if let Some(pair) = orb_slam::pair(&root) {
+        let [first, mut second] = [entry_of(&pair.cameras[0])?, entry_of(&pair.cameras[1])?];
+        if let Some((key, place)) = &pair.first_from_second {
+            let first_from_second: Rigid<Camera, Camera> = transform(key, place)?;
+            second.camera.body_from_camera =
+                first.camera.body_from_camera.map(|first| first * first_from_second);
+        }
+        add(&mut file, "cam0", first);
+        add(&mut file, "cam1", second);
         return Ok(file);
     }
     if keys::describes_camera(&root) {

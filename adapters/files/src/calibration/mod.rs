@@ -23,6 +23,7 @@ mod dialects;
 mod entry;
 mod keys;
 mod lens;
+mod orb_slam;
 mod toml_file;
 mod tree;
 
@@ -38,6 +39,8 @@ use vice_core::time::Span;
 use crate::atomic::{self, Overwrite};
 use crate::rigid_file::is_toml;
 use crate::yaml;
+
+pub use colmap::ColmapModel;
 
 /// What is read, for messages.
 const DIALECTS: &str = "a calibration is TOML (named .toml), a camchain of Kalibr or OpenVINS, a sensor.yaml, a camera_info \
@@ -169,6 +172,11 @@ impl CalibrationFile {
             file.time_offsets.insert(camera.to_string(), offset);
         }
         Ok(file)
+    }
+
+    /// Whether the file has one camera and does not name it.
+    pub const fn is_nameless(&self) -> bool {
+        self.nameless
     }
 
     /// The one entry whose topic has the camera's name as a part: `/cam0/image_raw` is `cam0`.

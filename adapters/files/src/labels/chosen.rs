@@ -103,6 +103,8 @@ struct Sifter<'a> {
     wanted: &'a [String],
     points: Vec<Point>,
     by_name: HashMap<String, usize>,
+    /// The camera of the first line.
+    camera: Option<String>,
     /// Files list points one after the other or frame by frame: the next one is mostly the same or the next.
     at: usize,
 }
@@ -113,7 +115,7 @@ impl<'a> Sifter<'a> {
         let columns = Columns::find(heading.split(delimiter)).ok()?;
         let width = heading.split(delimiter).count();
         let (points, by_name) = (Vec::new(), HashMap::new());
-        Some(Self { columns, delimiter, width, wanted, points, by_name, at: 0 })
+        Some(Self { columns, delimiter, width, wanted, points, by_name, camera: None, at: 0 })
     }
 
     /// The stamp of a line that is passed over; `Some(None)` where the line stays, `None` where all of them do.
@@ -134,6 +136,13 @@ impl<'a> Sifter<'a> {
             return None;
         }
         let stamp = self.columns.stamp(stamp).ok()?;
+        if let Some(column) = self.columns.camera {
+            // Of several cameras the same names are other points.
+            let camera = self.camera.get_or_insert_with(|| field(column).to_string());
+            if camera != field(column) {
+                return None;
+            }
+        }
         let name = field(self.columns.point);
         // The first line shows the unit of the stamps.
         let is_first = self.points.is_empty();
@@ -230,5 +239,8 @@ mod tests {
         ] {
             assert_eq!(sift(&format!("{head}{rest}"), points), None, "{rest}");
         }
+        let of_cameras = "point,timestamp_ns,u_px,v_px,keyframe,camera\na,1,1,2,1,cam0\nb,1,1,2,1,";
+        assert!(sift(&format!("{of_cameras}cam0\n"), &["a"]).is_some());
+        assert_eq!(sift(&format!("{of_cameras}cam1\n"), &["a"]), None);
     }
 }

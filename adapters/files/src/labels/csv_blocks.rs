@@ -113,6 +113,7 @@ impl Into {
         }
         self.lenient.check(self.kept, "pixel").ok()?;
         let mut file = LabelFile::of(self.labels.finish().ok()?);
+        file.labels.camera = plan.camera.clone().filter(|name| !name.is_empty());
         file.suspicions = self.lenient.suspicions("");
         file.suspicions.extend(plan.columns.unknown_said());
         Some(file)
@@ -129,6 +130,7 @@ enum Kind {
     Keyframe,
     Source,
     Flags,
+    Camera,
     Other,
 }
 
@@ -139,6 +141,8 @@ struct Plan {
     delimiter: u8,
     /// Stamps are whole nanoseconds.
     nanos: bool,
+    /// The camera of all rows; a file of several is read in another way.
+    camera: Option<String>,
 }
 
 /// What a block holds.
@@ -173,6 +177,16 @@ impl Plan {
         // The first row shows the unit of the stamps.
         let stamp = first.split(|b| *b == delimiter).nth(columns.timestamp)?;
         columns.stamp(std::str::from_utf8(stamp).ok()?.trim()).ok()?;
+        let camera = match columns.camera {
+            Some(column) => {
+                let field = first.split(|b| *b == delimiter).nth(column)?;
+                let name = std::str::from_utf8(field).ok()?;
+                Some(name.to_string())
+                    .filter(|n| n.trim() == n && !n.contains(['"', '\r', '\u{feff}']))?
+                    .into()
+            }
+            None => None,
+        };
         let kind = |column: usize| match column {
             c if c == columns.point => Kind::Point,
             c if c == columns.timestamp => Kind::Stamp,
@@ -181,11 +195,12 @@ impl Plan {
             c if c == columns.keyframe => Kind::Keyframe,
             c if Some(c) == columns.source => Kind::Source,
             c if Some(c) == columns.flags => Kind::Flags,
+            c if Some(c) == columns.camera => Kind::Camera,
             _ => Kind::Other,
         };
         let kinds = (0..text.split(char::from(delimiter)).count()).map(kind).collect();
         let nanos = columns.unit() == Some(TimeUnit::Nanos);
-        Some((Self { columns, kinds, delimiter, nanos }, &bytes[end..]))
+        Some((Self { columns, kinds, delimiter, nanos, camera }, &bytes[end..]))
     }
 
     fn parse(&self, block: &[u8]) -> Option<Parsed> {
@@ -321,6 +336,7 @@ impl Plan {
                     }
                 }
             }
+            Kind::Camera => (self.camera.as_ref()?.as_bytes() == field).then_some(())?,
             Kind::Point | Kind::Other => {
                 text().filter(|t| !t.contains(['"', '\r']) && !t.starts_with('\u{feff}'))?;
             }
@@ -486,6 +502,8 @@ mod tests {
         for text in [
             "point,timestamp_ns,u_px,v_px,keyframe\na,1,1.5,2.25,1\nb,1,3,4,1\na,2,-1.125,2,0\nb,2,3,4,0",
             "\u{feff}# by hand\n\npoint;t_s;u;v;key_frame;odd\na;1.5;1.5;2.5;1;x y\na;1.75;1;2;False;\n",
+            "point,timestamp_ns,u_px,v_px,keyframe,camera\na,1,1.5,2.25,1,cam0\nb,1,3,4,1,cam0\n",
+            "camera,point,timestamp_ns,u_px,v_px,keyframe\n,a,1,1.5,2.25,1\n,b,1,3,4,1\n",
             "label\ttimestamp [us]\tx [px]\ty [px]\tis_keyframe\r\na\t1500000\t1.5\t2.5\ttrue\r\n",
             "point,timestamp_ns,u_px,v_px,keyframe,source,flags\na,1,1,2,1,,\na,2,NaN,2,0,auto,occluded+uncertain\n\
              a,3,0.1234567890123456789,2e0,0,auto,uncertain\n",
@@ -501,6 +519,8 @@ mod tests {
             "point,timestamp_ns,u_px,v_px,keyframe\na,1.5E+18,1,2,1\na,1.6E+18,1,2,0\n",
             "point,timestamp_ns,u_px,v_px,keyframe\na,9223372036854775808,1,2,1\n",
             "{\"schema\": \"vice.labels/1\"}",
+            "point,timestamp_ns,u_px,v_px,keyframe,camera\na,1,1,2,1,cam0\na,1,1,2,1,cam1\n",
+            "point,timestamp_ns,u_px,v_px,keyframe,camera\na,1,1,2,1, cam0\n",
         ] {
             assert!(both(text.as_bytes()).is_none(), "{text}");
         }

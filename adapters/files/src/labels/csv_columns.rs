@@ -6,7 +6,7 @@ use vice_core::time::{Stamp, TimeError};
 
 use crate::columns::{ColumnName, Quantity, TimeUnit};
 
-const EXPECTED: &str = "a heading `point,timestamp_ns,u_px,v_px,keyframe[,source,flags]` is expected";
+const EXPECTED: &str = "a heading `point,timestamp_ns,u_px,v_px,keyframe[,source,flags,camera]` is expected";
 
 /// Where the columns are.
 pub(super) struct Columns {
@@ -19,18 +19,20 @@ pub(super) struct Columns {
     pub(super) keyframe: usize,
     pub(super) source: Option<usize>,
     pub(super) flags: Option<usize>,
+    pub(super) camera: Option<usize>,
     /// Names that are not known.
     pub(super) unknown: Vec<String>,
 }
 
 /// Names of each column beside its own, in lower case and without `_`.
-const NAMES: [(&str, &[&str]); 6] = [
+const NAMES: [(&str, &[&str]); 7] = [
     ("point", &["point", "pointid", "pointname", "label", "landmark", "feature"]),
     ("u_px", &["upx", "u", "pxu", "pixelu", "x", "xpx", "px", "pixelx", "imagex", "col", "column"]),
     ("v_px", &["vpx", "v", "pxv", "pixelv", "y", "ypx", "py", "pixely", "imagey", "row"]),
     ("keyframe", &["keyframe", "iskeyframe", "key", "iskey"]),
     ("source", &["source"]),
     ("flags", &["flags", "flag"]),
+    ("camera", &["camera", "cameraname"]),
 ];
 
 impl Columns {
@@ -86,12 +88,12 @@ impl Columns {
         };
         let (u_px, v_px) = (required("u_px", find("u_px")?)?, required("v_px", find("v_px")?)?);
         let keyframe = required("keyframe", find("keyframe")?)?;
-        let (source, flags) = (find("source")?, find("flags")?);
+        let (source, flags, camera) = (find("source")?, find("flags")?, find("camera")?);
         used[timestamp] = true;
         let unknown =
             names.iter().zip(&used).filter(|(_, used)| !**used).map(|(n, _)| (*n).to_string()).collect();
         let unit = columns[timestamp].time_unit();
-        Ok(Self { point, timestamp, unit, u_px, v_px, keyframe, source, flags, unknown })
+        Ok(Self { point, timestamp, unit, u_px, v_px, keyframe, source, flags, camera, unknown })
     }
 
     /// A stamp in the unit of the column.

@@ -4,8 +4,9 @@ use std::io::{self, Write};
 
 use vice_core::camera::Pixel;
 use vice_core::error::{DataError, DataResult};
-use vice_core::label::{LabelSet, LabelSetBuilder, Observation, ObservationSource};
+use vice_core::label::{LabelSet, Observation, ObservationSource};
 
+use super::by_camera::ByCamera;
 use super::csv_columns::Columns;
 use super::{LabelFile, label_error, no_labels, rounded};
 use crate::leniency::Leniency;
@@ -15,6 +16,8 @@ pub(super) const UNCERTAIN: &str = "uncertain";
 
 /// Reads CSV with a heading. `source` is `manual` and `flags` empty where there are no such columns.
 ///
+/// A column `camera` says whose labels they are; a file may hold those of several cameras: see [`LabelFile::of_camera`].
+///
 /// `flags` are `occluded` and `uncertain`, joined by `+` or `|`. Stamps are in the unit that the name of their column
 /// says. A row whose pixel is NaN holds no label and is left out, unless it is a key frame.
 ///
@@ -22,7 +25,7 @@ pub(super) const UNCERTAIN: &str = "uncertain";
 /// [`DataError`] with the line for a missing column, a field that cannot be read, stamps that were rounded, and as
 /// [`LabelSet::from_rows`].
 pub fn read_csv(bytes: &[u8]) -> DataResult<LabelSet> {
-    read_csv_file(bytes).map(|file| file.labels)
+    read_csv_file(bytes)?.of_one_camera()
 }
 
 /// The same, with what was left out and columns that are not known.
@@ -46,7 +49,7 @@ pub(super) fn read_sifted(bytes: &[u8], passed: u64) -> DataResult<LabelFile> {
     let heading = csv.headers().map_err(|e| csv_error(&e))?.clone();
     let heading_line = lines.at_end_of_record(csv.position());
     let mut columns = Columns::find(heading.iter()).map_err(|e| e.line(heading_line))?;
-    let mut labels = LabelSetBuilder::default();
+    let mut labels = ByCamera::default();
     let mut lenient = Leniency::new();
     // Stamps of few digits, and the largest number of these.
     let (mut rows, mut few, mut most_digits) = (passed, 0_u64, 0);
@@ -74,7 +77,8 @@ pub(super) fn read_sifted(bytes: &[u8], passed: u64) -> DataResult<LabelFile> {
         }
         kept += 1;
         let point = record.get(columns.point).unwrap_or_default().trim();
-        labels.push(point, observation).map_err(label_error)?;
+        let camera = columns.camera.and_then(|column| record.get(column)).unwrap_or_default().trim();
+        labels.of(camera).push(point, observation).map_err(label_error)?;
     }
     if rows == 0 {
         return Err(no_labels());
@@ -84,9 +88,7 @@ pub(super) fn read_sifted(bytes: &[u8], passed: u64) -> DataResult<LabelFile> {
         return Err(rounded::error(most_digits).line(heading_line + 1));
     }
     lenient.check(kept, "pixel")?;
-    let labels =
-        labels.finish().map_err(|e| if few > 0 { rounded::error(most_digits) } else { label_error(e) })?;
-    let mut file = LabelFile::of(labels);
+    let mut file = labels.finish(|e| if few > 0 { rounded::error(most_digits) } else { label_error(e) })?;
     file.suspicions = lenient.suspicions("");
     file.suspicions.extend(columns.unknown_said());
     Ok(file)
@@ -139,7 +141,7 @@ impl Lines<'_> {
     }
 }
 
-/// Writes all columns, points in natural order, observations in time order. What a tracker says of its work
+/// Writes all columns, `camera` where the labels say theirs, points in natural order, observations in time order. What a tracker says of its work
 /// ([`vice_core::label::Provenance`]) has no column: JSON keeps it.
 ///
 /// # Errors
@@ -149,12 +151,13 @@ pub fn write_csv(writer: &mut dyn Write, labels: &LabelSet) -> io::Result<()> {
     let marked = labels.points().iter().any(|p| p.name.starts_with('\u{feff}'));
     let quotes = if marked { csv::QuoteStyle::Always } else { csv::QuoteStyle::Necessary };
     let mut csv = csv::WriterBuilder::new().quote_style(quotes).from_writer(writer);
-    csv.write_record(["point", "timestamp_ns", "u_px", "v_px", "keyframe", "source", "flags"])?;
+    let heading = ["point", "timestamp_ns", "u_px", "v_px", "keyframe", "source", "flags"];
+    csv.write_record(heading.into_iter().chain(labels.camera.as_ref().map(|_| "camera")))?;
     for point in labels.points() {
         for o in &point.observations {
             let marks = [(o.occluded, OCCLUDED), (o.uncertain, UNCERTAIN)];
             let flags: Vec<&str> = marks.iter().filter(|(set, _)| *set).map(|(_, name)| *name).collect();
-            csv.write_record([
+            let cells = [
                 point.name.as_str(),
                 &o.stamp.to_string(),
                 &o.px.u.to_string(),
@@ -162,7 +165,8 @@ pub fn write_csv(writer: &mut dyn Write, labels: &LabelSet) -> io::Result<()> {
                 if o.keyframe { "1" } else { "0" },
                 o.source.name(),
                 &flags.join("+"),
-            ])?;
+            ];
+            csv.write_record(cells.into_iter().chain(labels.camera.as_deref()))?;
         }
     }
     csv.flush()

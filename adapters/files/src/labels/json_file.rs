@@ -7,7 +7,8 @@
 //!      "occluded": false, "uncertain": false}]}]}
 //! ```
 //!
-//! `dataset`, `camera` and `tool`, which made the automatic ones where it is not VICE, may be missing; so may everything of an observation but its stamp and pixel. An observation that
+//! A point may have a `camera` of its own, which goes before that of the document: so one file holds the labels of several
+//! cameras. `dataset`, `camera` and `tool`, which made the automatic ones where it is not VICE, may be missing; so may everything of an observation but its stamp and pixel. An observation that
 //! a machine made may also carry `confidence` (0 to 1), `tracker_version` and `seeded`. Fields that are not known are
 //! passed over, so that a file may carry more.
 
@@ -16,10 +17,11 @@ use std::io::{self, Write};
 use serde::{Deserialize, Serialize};
 use vice_core::camera::Pixel;
 use vice_core::error::{DataError, DataResult};
-use vice_core::label::{LabelRow, LabelSet, Observation, ObservationSource, Provenance};
+use vice_core::label::{LabelSet, Observation, ObservationSource, Provenance};
 use vice_core::time::Stamp;
 
-use super::{no_labels, validated};
+use super::by_camera::ByCamera;
+use super::{LabelFile, label_error, no_labels};
 
 /// Name and version of the schema written, the newest that is read.
 pub const LABELS_SCHEMA: &str = "vice.labels/1";
@@ -46,6 +48,8 @@ struct Document {
 #[derive(Serialize, Deserialize)]
 struct PointDocument {
     name: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    camera: Option<String>,
     observations: Vec<ObservationDocument>,
 }
 
@@ -74,8 +78,13 @@ struct ObservationDocument {
 /// # Errors
 /// [`DataError`] with the line if it is no such JSON, of another or a newer schema, and as [`LabelSet::from_rows`].
 pub fn read_json(bytes: &[u8]) -> DataResult<LabelSet> {
-    let labels = read_json_or_none(bytes)?;
-    if labels.points().is_empty() { Err(no_labels()) } else { Ok(labels) }
+    read_json_file(bytes)?.of_one_camera()
+}
+
+/// The same, of any number of cameras.
+pub(super) fn read_json_file(bytes: &[u8]) -> DataResult<LabelFile> {
+    let file = read_document(bytes)?;
+    if file.labels.points().is_empty() { Err(no_labels()) } else { Ok(file) }
 }
 
 /// As [`read_json`], but a document may hold no points: that is how an annotator begins.
@@ -83,34 +92,41 @@ pub fn read_json(bytes: &[u8]) -> DataResult<LabelSet> {
 /// # Errors
 /// As [`read_json`], except for a document without labels.
 pub fn read_json_or_none(bytes: &[u8]) -> DataResult<LabelSet> {
+    read_document(bytes)?.of_one_camera()
+}
+
+fn read_document(bytes: &[u8]) -> DataResult<LabelFile> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let head: Head = serde_json::from_slice(bytes).map_err(|e| json_error(&e))?;
     check_schema(head.schema.as_deref())?;
     let document: Document = serde_json::from_slice(bytes).map_err(|e| json_error(&e))?;
-    let rows = document.points.into_iter().flat_map(|PointDocument { name, observations }| {
-        observations.into_iter().map(move |o| LabelRow {
-            point: name.clone(),
-            observation: Observation {
+    let mut by_camera = ByCamera::default();
+    if document.points.is_empty() {
+        by_camera.of(document.camera.as_deref().unwrap_or_default());
+    }
+    for PointDocument { name, camera, observations } in document.points {
+        let labels = by_camera.of(camera.or(document.camera.clone()).unwrap_or_default().trim());
+        for o in observations {
+            let provenance =
+                Provenance { confidence: o.confidence, tracker_version: o.tracker_version, seeded: o.seeded };
+            let observation = Observation {
                 stamp: o.timestamp_ns,
                 px: o.px,
                 source: o.source,
                 keyframe: o.keyframe,
                 occluded: o.occluded,
                 uncertain: o.uncertain,
-                provenance: Provenance {
-                    confidence: o.confidence,
-                    tracker_version: o.tracker_version,
-                    seeded: o.seeded,
-                },
+                provenance,
                 line: 0,
-            },
-        })
-    });
-    let mut labels = validated(rows.collect())?;
-    labels.dataset = document.dataset;
-    labels.camera = document.camera;
-    labels.tool = document.tool;
-    Ok(labels)
+            };
+            labels.push(&name, observation).map_err(label_error)?;
+        }
+    }
+    let mut file = by_camera.finish(label_error)?;
+    for labels in std::iter::once(&mut file.labels).chain(&mut file.of_other_cameras) {
+        (labels.dataset, labels.tool) = (document.dataset.clone(), document.tool.clone());
+    }
+    Ok(file)
 }
 
 /// Writes a document of schema [`LABELS_SCHEMA`], indented.
@@ -120,6 +136,7 @@ pub fn read_json_or_none(bytes: &[u8]) -> DataResult<LabelSet> {
 pub fn write_json(writer: &mut dyn Write, labels: &LabelSet) -> io::Result<()> {
     let points = labels.points().iter().map(|point| PointDocument {
         name: point.name.clone(),
+        camera: None,
         observations: point
             .observations
             .iter()

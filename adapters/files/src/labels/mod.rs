@@ -2,13 +2,14 @@
 //!
 //! | format | what |
 //! | --- | --- |
-//! | CSV | `point,timestamp_ns,u_px,v_px,keyframe` and optionally `source,flags`: the interchange form |
+//! | CSV | `point,timestamp_ns,u_px,v_px,keyframe` and optionally `source,flags,camera`: the interchange form |
 //! | JSON | schema `vice.labels/1`, which also names the data set and the camera |
 //! | Parquet | the same in columns, with all that JSON has: for labels by the million |
 //! | CVAT | "CVAT for video 1.1", tracks of points, of the annotation tool CVAT; counts frames, as the pickle does |
 //! | npy, npz | arrays of tracks, (frames, points, 2), as trackers of points write them; read by [`read_tracks`] only |
 //! | pickle | `{point: {frame index: (array([x, y]), is_keyframe)}}`, as the paper's authors stored them; read only |
 
+mod by_camera;
 mod chosen;
 mod csv_blocks;
 mod csv_columns;
@@ -38,6 +39,7 @@ use vice_core::time::Stamp;
 pub use csv_file::{read_csv, read_csv_file, write_csv};
 pub use cvat::{read_cvat, read_cvat_file};
 pub use cvat_write::write_cvat;
+use json_file::read_json_file;
 pub use json_file::{LABELS_SCHEMA, read_json, read_json_or_none, write_json};
 pub use pickle::read_pickle;
 pub use tracks::{TracksOptions, is_tracks, is_tracks_file, read_tracks};
@@ -97,8 +99,10 @@ impl LabelFormat {
 /// Labels as a file has them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LabelFile {
-    /// The labels.
+    /// The labels; of a file with several cameras those of the first by name.
     pub labels: LabelSet,
+    /// The labels of the other cameras.
+    pub of_other_cameras: Vec<LabelSet>,
     /// What was left out, and what looks wrong.
     pub suspicions: Suspicions,
     /// Columns and rows of the images that were labelled, where the file says so.
@@ -132,11 +136,13 @@ impl LabelFile {
 /// them.
 ///
 /// # Errors
-/// [`DataError`] with path and line if the file cannot be read or a row cannot be used.
+/// [`DataError`] with path and line if the file cannot be read or a row cannot be used, and if it holds labels of several
+/// cameras.
 pub fn read(path: impl AsRef<Path>, frame_stamps: Option<&[Stamp]>) -> DataResult<LabelSet> {
+    let path = path.as_ref();
     let file = read_file(path, frame_stamps)?;
     crate::leniency::log(&file.suspicions);
-    Ok(file.labels)
+    file.of_one_camera().map_err(|e| e.at(path))
 }
 
 /// As [`read`], with what was left out and what looks wrong.
@@ -165,7 +171,9 @@ pub fn read_file(path: impl AsRef<Path>, frame_stamps: Option<&[Stamp]>) -> Data
         parsed(&bytes, frame_stamps).map_err(|e| e.at(path))?
     };
     if let Some(frames) = frame_stamps {
-        rounded::check(&file.labels, frames).map_err(|e| e.at(path))?;
+        for labels in std::iter::once(&file.labels).chain(&file.of_other_cameras) {
+            rounded::check(labels, frames).map_err(|e| e.at(path))?;
+        }
     }
     Ok(about(path, file))
 }
@@ -219,7 +227,7 @@ fn of_points(file: LabelFile, points: &[String]) -> (LabelFile, bool) {
 fn parsed(bytes: &[u8], frame_stamps: Option<&[Stamp]>) -> DataResult<LabelFile> {
     match LabelFormat::of_content(bytes) {
         LabelFormat::Csv => read_csv_file(bytes),
-        LabelFormat::Json => read_json(bytes).map(LabelFile::of),
+        LabelFormat::Json => read_json_file(bytes),
         LabelFormat::Pickle => frame_stamps
             .ok_or_else(|| counts_frames("a pickle"))
             .and_then(|s| read_pickle(bytes, s))
@@ -281,16 +289,14 @@ pub fn write_with_frames(
 
 /// Rows as a validated set, with the line of the one at fault.
 fn labels_from(rows: Vec<LabelRow>) -> DataResult<LabelSet> {
-    if rows.is_empty() { Err(no_labels()) } else { validated(rows) }
+    if rows.is_empty() {
+        return Err(no_labels());
+    }
+    LabelSet::from_rows(rows).map_err(label_error)
 }
 
 fn no_labels() -> DataError {
     DataError::new("the file holds no labels")
-}
-
-/// Rows, if there are any, as a validated set.
-fn validated(rows: Vec<LabelRow>) -> DataResult<LabelSet> {
-    LabelSet::from_rows(rows).map_err(label_error)
 }
 
 /// With the line of the row at fault.

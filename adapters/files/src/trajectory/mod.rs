@@ -114,12 +114,21 @@ impl TrajectoryFile {
         if let Some(columns) = self.passed_over {
             self.suspicions.add(
                 Suspicion::new("columns-passed-over", &about, "columns without names are passed over")
-                    .evidence(format!("{columns} columns, of which the first 8 are read"))
+                    .evidence(format!("{columns} columns, of which the first 8 are read{}", beyond(columns)))
                     .advice("name the columns in a first line, such as timestamp tx ty tz qx qy qz qw"),
             );
         }
         self.suspicions.extend(plausible::suspicion(&self.trajectory, &about));
         self
+    }
+}
+
+/// What so many columns may be, for a person to recognise.
+const fn beyond(columns: usize) -> &'static str {
+    match columns {
+        29 | 44 => "; the others are as many as a covariance has",
+        14 => "; the others are as many as the variances of a pose",
+        _ => "",
     }
 }
 

@@ -8,8 +8,9 @@ use std::path::Path;
 
 use nalgebra::Point3;
 use vice_core::error::{DataError, DataResult, ErrorKind};
+use vice_files::calibration::ColmapModel;
 
-use super::camera::{ModelCamera, by_number};
+use super::camera::ModelCamera;
 use super::{ModelImage, pose};
 
 /// Bytes beyond which an image's name is none.
@@ -119,10 +120,10 @@ pub(super) fn cameras(path: &Path) -> DataResult<BTreeMap<u32, ModelCamera>> {
     for _ in 0..bytes.count(48, "cameras")? {
         let at = bytes.at;
         let id = bytes.u32()?;
-        let model = by_number(bytes.u32()?).map_err(|e| e.byte(at))?;
+        let model = ColmapModel::by_number(bytes.u32()?).map_err(|e| e.byte(at))?;
         let size = [bytes.u64()?, bytes.u64()?];
-        let mut parameters = Vec::with_capacity(model.1);
-        for _ in 0..model.1 {
+        let mut parameters = Vec::with_capacity(model.parameters);
+        for _ in 0..model.parameters {
             parameters.push(bytes.f64("a parameter of a camera")?);
         }
         found.insert(id, ModelCamera::new(model, size, parameters).map_err(|e| e.byte(at))?);

@@ -8,8 +8,9 @@ use std::str::FromStr;
 
 use nalgebra::Point3;
 use vice_core::error::{DataError, DataResult, ErrorKind};
+use vice_files::calibration::ColmapModel;
 
-use super::camera::{ModelCamera, by_name};
+use super::camera::ModelCamera;
 use super::{ModelImage, pose};
 
 /// Bytes beyond which a line is none: an image of a model has some ten thousand points in one line.
@@ -60,7 +61,7 @@ pub(super) fn cameras(path: &Path) -> DataResult<BTreeMap<u32, ModelCamera>> {
         }
         let fields = &mut row.split_whitespace();
         let id: u32 = field(fields, "CAMERA_ID")?;
-        let model = by_name(&field::<String>(fields, "MODEL")?)?;
+        let model = ColmapModel::by_name(&field::<String>(fields, "MODEL")?)?;
         let size = [field(fields, "WIDTH")?, field(fields, "HEIGHT")?];
         let mut parameters = Vec::new();
         for text in fields.by_ref() {

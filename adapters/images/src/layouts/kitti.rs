@@ -20,11 +20,12 @@ pub(crate) type FirstCamera = Camera;
 #[derive(Debug)]
 pub(crate) struct Lines {
     path: PathBuf,
-    entries: BTreeMap<String, (u64, Vec<f64>)>,
+    /// By name: the line, and its numbers or the first word that is none.
+    entries: BTreeMap<String, (u64, Result<Vec<f64>, String>)>,
 }
 
 impl Lines {
-    /// Reads a file; lines whose values are no numbers, such as dates, are passed over.
+    /// Reads a file; lines whose values are no numbers, such as dates, are an error only where they are asked for.
     ///
     /// # Errors
     /// [`DataError`] if it cannot be read.
@@ -36,10 +37,8 @@ impl Lines {
         let mut entries = BTreeMap::new();
         for (line, row) in (1_u64..).zip(text.lines()) {
             let Some((key, values)) = row.split_once(':') else { continue };
-            let values: Result<Vec<f64>, _> = values.split_whitespace().map(str::parse).collect();
-            if let Ok(values) = values {
-                entries.insert(key.trim().to_string(), (line, values));
-            }
+            let number = |word: &str| word.parse::<f64>().map_err(|_| word.to_string());
+            entries.insert(key.trim().to_string(), (line, values.split_whitespace().map(number).collect()));
         }
         Ok(Self { path: path.to_path_buf(), entries })
     }
@@ -53,7 +52,8 @@ impl Lines {
             DataError::of_kind(ErrorKind::Missing, format!("has no line `{key}:`")).at(&self.path)
         })?;
         let wrong = |problem: String| DataError::new(problem).at(&self.path).line(*line);
-        let found = <[f64; N]>::try_from(values.clone())
+        let values = values.clone().map_err(|word| wrong(format!("`{key}`: `{word}` is no number")))?;
+        let found = <[f64; N]>::try_from(values)
             .map_err(|v| wrong(format!("`{key}` has {} numbers, where {N} are expected", v.len())))?;
         match found.iter().all(|v| v.is_finite()) {
             true => Ok(found),
@@ -105,4 +105,27 @@ pub(crate) fn road(body_from_first: &Rigid<Body, FirstCamera>) -> DataResult<Flo
     // y points down in the camera: 1.65 - y = 0 on the road.
     let plane = Plane::<FirstCamera>::new([0.0, -1.0, 0.0], CAMERA_HEIGHT_M)?;
     Ok(Floor::Body(plane.transformed(body_from_first)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mistakes_are_named_with_their_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("calib.txt");
+        std::fs::write(&path, "calib_time: 09-Jan-2012 13:57:47\nP0: 1 2 x\nP1: 1 2\nP2: 1 nan 3\n").unwrap();
+        let lines = Lines::read(&path).unwrap();
+        let error = |key: &str| lines.numbers::<3>(key).unwrap_err().to_string();
+        assert!(error("P0").contains("calib.txt:2: `P0`: `x` is no number"), "{}", error("P0"));
+        assert!(
+            error("P1").contains("calib.txt:3: `P1` has 2 numbers, where 3 are expected"),
+            "{}",
+            error("P1")
+        );
+        assert!(error("P2").contains("calib.txt:4: `P2` has a number that is not finite"), "{}", error("P2"));
+        assert!(error("P3").contains("has no line `P3:`"), "{}", error("P3"));
+        assert!(error("calib_time").contains("calib.txt:1: "), "{}", error("calib_time"));
+    }
 }

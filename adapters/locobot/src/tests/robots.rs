@@ -247,3 +247,41 @@ fn a_long_chain_of_frames_takes_no_time() {
     assert!(facts(data.as_ref()).contains("trees that are not connected"));
     assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
 }
+
+/// A path as a SLAM publishes it: the way so far, whose earlier poses move when a loop closes.
+fn paths(frame_of_poses: &str, count: usize) -> Vec<Msg> {
+    let mut messages = run();
+    for length in 1..=count {
+        let nanos = |i: usize| START + TENTH * (1 + i as i64);
+        messages.push(Msg::new("/slam/path", "nav_msgs/Path", nanos(length), |out| {
+            (0..length).fold(out.header(nanos(length), "map").u32(length as u32), |out, i| {
+                let moved = if length == count { 0.5 } else { 0.0 };
+                out.header(nanos(i), frame_of_poses).f64s(&[i as f64 + moved, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+            })
+        }));
+    }
+    messages.sort_by_key(|m| m.nanos);
+    messages
+}
+
+#[test]
+fn the_last_of_the_paths_is_a_stream() {
+    for frame in ["map", ""] {
+        let messages = paths(frame, 5);
+        for recording in [Opened::bag(&messages), Opened::new("run.mcap", &mcap(&messages))] {
+            let data = recording.open(&[]).unwrap();
+            assert!(data.streams().contains(&"/slam/path".to_string()), "{:?}", data.streams());
+            let path = data.trajectory("/slam/path").unwrap();
+            assert_eq!((path.len(), path.start()), (5, at(TENTH)));
+            assert!((path.path_length_m() - 4.0).abs() < 1e-9);
+            let first = path.pose_at(at(TENTH), Span::ZERO).unwrap();
+            assert!((first.translation().x - 0.5).abs() < 1e-12, "the last message moved it");
+        }
+    }
+    // A path that is cut short is told, and stops nothing.
+    let mut messages = paths("map", 5);
+    let last = messages.iter_mut().rev().find(|m| m.topic == "/slam/path").unwrap();
+    *last = Msg::new("/slam/path", "nav_msgs/Path", last.nanos, |out| out.header(START, "map").u32(900));
+    let data = Opened::bag(&messages).open(&[]).unwrap();
+    assert!(doubts(data.as_ref()).contains("/slam/path"), "{}", doubts(data.as_ref()));
+}

@@ -121,7 +121,7 @@ fn labels() -> [Case; 11] {
         case("`depth compare`", "labels of 4 points", |folder, n, _| {
             flight::write(folder, n / POINTS, POINTS)?;
             surfaces::write_mesh(folder, 2_000)?;
-            Ok(words("depth compare flight --labels labels.csv --source floor,mesh"))
+            Ok(words("depth compare flight --labels labels.csv --depth floor,mesh"))
         }),
         case("`report`", "labels of 4 points", |folder, n, program| {
             result(folder, n, program)?;
@@ -179,18 +179,18 @@ fn recordings() -> [Case; 7] {
 
 fn surfaces() -> [Case; 3] {
     [
-        case("`depth --source mesh`", "faces", |folder, n, _| {
+        case("`depth --depth mesh`", "faces", |folder, n, _| {
             flight::write(folder, FRAMES, 1)?;
             surfaces::write_mesh(folder, n)?;
-            Ok(words("depth flight --at 0 --source mesh --out out"))
+            Ok(words("depth flight --at 0 --depth mesh --out out"))
         }),
         Case {
             // With fewer points the camera sees none.
             sizes: [10_000, 100_000, 1_000_000],
-            ..case("`depth --source zmap`", "points of the scan", |folder, n, _| {
+            ..case("`depth --depth zmap`", "points of the scan", |folder, n, _| {
                 flight::write(folder, FRAMES, 1)?;
                 surfaces::write_scan(folder, n)?;
-                Ok(words("depth flight --at 0 --source zmap --out out"))
+                Ok(words("depth flight --at 0 --depth zmap --out out"))
             })
         },
         case("`floor fit`", "points of the scan", |folder, n, _| {

@@ -34,7 +34,8 @@ pub(crate) struct Args {
     /// Data set whose frames a pickle or CVAT counts.
     #[arg(long, value_name = "DATASET")]
     dataset: Option<PathBuf>,
-    /// Camera of that data set [default: the first].
+    /// Camera whose labels they are: of a file with several it takes those, and a file that names none gets it. Where frames
+    /// are counted, camera of the data set [default: the first].
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
     #[command(flatten)]
@@ -135,7 +136,16 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     }
     let frames = args.counted_spec().as_ref().map(Counted::of).transpose()?;
     let stamps = frames.as_ref().map(|f| f.stamps.as_ref());
-    let mut set = place.told(labels::read(place.path(), stamps))?;
+    let file = place.told(labels::read_file(place.path(), stamps))?;
+    terminal::warn(file.suspicions.iter());
+    let at = |e: vice_run::core::error::DataError| e.at(&args.input);
+    let mut set = match &args.camera {
+        Some(camera) => file.of_camera(camera).map_err(at)?.labels,
+        None => file.of_one_camera().map_err(at)?,
+    };
+    if let Some(camera) = &args.camera {
+        set.camera.get_or_insert_with(|| camera.clone());
+    }
     if let Some(frames) = &frames {
         set.dataset.get_or_insert_with(|| frames.dataset.clone());
         set.camera.get_or_insert_with(|| frames.camera.clone());

@@ -12,13 +12,16 @@ use vice_run::host::conformance::{Event, Verdict};
 
 use super::child;
 use crate::itself::Itself;
+use crate::outputs::{JsonArgs, Outputs};
 use crate::terminal::{self, Outcome, printable, usage};
 
 /// Arguments of `vice plugin check`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example: vice plugin check libvice_adapter_myrobot.so my_recording\n\n\
+#[command(
+    after_help = "Example: vice plugin check libvice_adapter_myrobot.so my_recording --json report.json\n\n\
     `good` is as it should be, `missing` is allowed and says what will not work without it, `suspicious` is allowed but\n\
-    looks like a mistake, FAULT breaks the contract. The exit code is 1 where there is a fault.")]
+    looks like a mistake, FAULT breaks the contract. The exit code is 1 where there is a fault."
+)]
 pub(crate) struct Args {
     /// The plugin, a shared library.
     #[arg(value_name = "FILE")]
@@ -41,6 +44,8 @@ pub(crate) struct Args {
     /// Load the plugin even from a file or folder that others may write to.
     #[arg(long)]
     allow_writable_plugin: bool,
+    #[command(flatten)]
+    json: JsonArgs,
     /// Run the suite itself: what the program starts as its child.
     #[arg(long, hide = true)]
     as_child: bool,
@@ -57,6 +62,7 @@ pub(crate) fn run(args: &Args, itself: &Itself) -> anyhow::Result<Outcome> {
             allow_writable: args.allow_writable_plugin,
         });
     }
+    let outputs = Outputs::new(&[&args.json.json], &[args.file.clone(), args.dataset.clone()])?;
     if !args.dataset.exists() {
         return Err(usage(format!("{}: no such file or folder", args.dataset.display())));
     }
@@ -68,7 +74,7 @@ pub(crate) fn run(args: &Args, itself: &Itself) -> anyhow::Result<Outcome> {
         .spawn()
         .context("the check cannot be started in a process of its own")?;
     let lines = lines_of(&mut child);
-    let mut report = Report::default();
+    let mut report = Report { quiet: args.json.is_printed(), ..Report::default() };
     let ended = report.follow(&lines, Duration::from_secs(args.timeout))?;
     if ended == Ended::Hangs {
         // It may have ended just now.
@@ -93,6 +99,16 @@ pub(crate) fn run(args: &Args, itself: &Itself) -> anyhow::Result<Outcome> {
         Ended::Complete => {}
     }
     report.sum_up()?;
+    if let Some(path) = &args.json.json {
+        let document = Document {
+            schema: "vice.plugin-check/1",
+            file: printable(&args.file.display().to_string()),
+            dataset: printable(&args.dataset.display().to_string()),
+            findings: report.findings.clone(),
+            faults: report.count(Verdict::Fault),
+        };
+        outputs.write_json(path, &document)?;
+    }
     match report.count(Verdict::Fault) {
         0 => Ok(Outcome::Done),
         1 => Err(anyhow::anyhow!("{}: 1 fault", args.file.display())),
@@ -127,11 +143,31 @@ enum Ended {
     Hangs,
 }
 
+/// The document `vice.plugin-check/1`.
+#[derive(serde::Serialize)]
+struct Document {
+    schema: &'static str,
+    file: String,
+    dataset: String,
+    findings: Vec<Finding>,
+    faults: usize,
+}
+
+#[derive(Clone, serde::Serialize)]
+struct Finding {
+    /// `good`, `missing`, `suspicious` or `fault`.
+    verdict: &'static str,
+    says: String,
+}
+
 #[derive(Default)]
 struct Report {
     step: String,
     found: Vec<Verdict>,
+    findings: Vec<Finding>,
     prints: bool,
+    /// The document takes the place of the text.
+    quiet: bool,
 }
 
 impl Report {
@@ -159,6 +195,11 @@ impl Report {
             Verdict::Suspicious => "suspicious",
             Verdict::Fault => "FAULT",
         };
+        let lower = if verdict == Verdict::Fault { "fault" } else { word };
+        self.findings.push(Finding { verdict: lower, says: printable(text) });
+        if self.quiet {
+            return Ok(());
+        }
         terminal::print(&format!("{word:<11} {}\n", printable(text)))
     }
 
@@ -178,6 +219,9 @@ impl Report {
 
     fn sum_up(&self) -> anyhow::Result<()> {
         let count = |verdict| self.count(verdict);
+        if self.quiet {
+            return Ok(());
+        }
         terminal::print(&format!(
             "{} good, {} missing, {} suspicious, {} faults\n",
             count(Verdict::Good),

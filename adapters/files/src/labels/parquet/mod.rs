@@ -6,6 +6,7 @@
 //! | `timestamp_ns` | whole number | or a column of time stamps in any unit |
 //! | `u_px`, `v_px` | double | NaN or nothing: no label, as in CSV |
 //! | `keyframe`, `occluded`, `uncertain` | yes or no | |
+//! | `camera` | text | read; written is the file's own metadata |
 //! | `confidence`, `tracker_version`, `seeded` | | only where a tracker says so |
 //!
 //! Columns are found by their names as those of CSV are, and may be missing from `source` on. The file's own metadata holds

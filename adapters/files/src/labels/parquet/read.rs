@@ -8,13 +8,14 @@ use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader, RowGroupMe
 use rayon::prelude::*;
 use vice_core::camera::Pixel;
 use vice_core::error::{DataError, DataResult, ErrorKind};
-use vice_core::label::{LabelSetBuilder, Marks, Observation, ObservationList, ObservationSource, Provenance};
+use vice_core::label::{Marks, Observation, ObservationList, ObservationSource, Provenance};
 use vice_core::time::Stamp;
 
 use super::columns::{Column, Stored, Texts};
 use super::source::Source;
 use super::{CAMERA, DATASET, SCHEMA};
 use crate::columns::TimeUnit;
+use crate::labels::by_camera::ByCamera;
 use crate::labels::csv_columns;
 use crate::labels::csv_file::{OCCLUDED, UNCERTAIN};
 use crate::labels::json_file::check_schema;
@@ -59,7 +60,8 @@ fn read_source(source: &Source, wanted: Option<&[String]>) -> DataResult<LabelFi
     let rows = check_counts(&metadata, source)?;
     let (table, unknown) = Table::find(&metadata)?;
     let mut into = Into {
-        labels: LabelSetBuilder::default(),
+        labels: ByCamera::default(),
+        camera: said(CAMERA).unwrap_or_default(),
         lenient: Leniency::new(),
         kept: 0,
         row: 0,
@@ -78,9 +80,10 @@ fn read_source(source: &Source, wanted: Option<&[String]>) -> DataResult<LabelFi
         return Err(no_labels());
     }
     into.lenient.check(into.kept, "pixel")?;
-    let mut labels = into.labels.finish().map_err(label_error)?;
-    (labels.dataset, labels.camera) = (said(DATASET), said(CAMERA));
-    let mut read = LabelFile::of(labels);
+    let mut read = into.labels.finish(label_error)?;
+    for labels in std::iter::once(&mut read.labels).chain(&mut read.of_other_cameras) {
+        labels.dataset = said(DATASET);
+    }
     read.suspicions = into.lenient.suspicions("");
     read.suspicions.extend(unknown.unknown_said());
     Ok(read)
@@ -131,6 +134,7 @@ struct Table {
     keyframe: Column,
     source: Option<Column>,
     flags: Option<Column>,
+    camera: Option<Column>,
     occluded: Option<Column>,
     uncertain: Option<Column>,
     confidence: Option<Column>,
@@ -173,6 +177,7 @@ impl Table {
             keyframe: column(found.keyframe, &[Flag, Whole])?,
             source: other(found.source, &[Text])?,
             flags: other(found.flags, &[Text])?,
+            camera: other(found.camera, &[Text])?,
             occluded,
             uncertain,
             confidence,
@@ -218,6 +223,7 @@ impl Table {
             keyframe,
             sources: texts(&self.source)?,
             flags: texts(&self.flags)?,
+            cameras: texts(&self.camera)?,
             occluded,
             uncertain,
             confidence: self.confidence.as_ref().map(|c| c.reals(source, group, rows)).transpose()?,
@@ -241,6 +247,7 @@ struct Group {
     keyframe: Vec<bool>,
     sources: Option<Texts>,
     flags: Option<Texts>,
+    cameras: Option<Texts>,
     occluded: Option<Vec<bool>>,
     uncertain: Option<Vec<bool>>,
     confidence: Option<Vec<f64>>,
@@ -266,6 +273,7 @@ impl Group {
         let plain = self.wrong.is_none()
             && no_flags
             && !name.is_empty()
+            && self.cameras.as_ref().is_none_or(|c| matches!(c, Texts::One(_)))
             && self.confidence.is_none()
             && self.tracker_version.is_none()
             && is_finite(&self.u_px)
@@ -292,7 +300,9 @@ impl Group {
 
 /// Where labels are taken in.
 struct Into<'a> {
-    labels: LabelSetBuilder,
+    labels: ByCamera,
+    /// The camera that the file names for all labels.
+    camera: String,
     lenient: Leniency,
     kept: usize,
     /// Rows before this group.
@@ -307,7 +317,11 @@ impl Into<'_> {
             self.lenient.rows(group.rows as u64);
             self.row += group.rows as u64;
             self.kept += group.rows;
-            return self.labels.append(&name, list).map_err(label_error);
+            let camera = match &group.cameras {
+                Some(Texts::One(camera)) if !camera.is_empty() => camera,
+                _ => &self.camera,
+            };
+            return self.labels.of(camera).append(&name, list).map_err(label_error);
         }
         let before = self.row;
         let at = |row: usize, problem: String| {
@@ -385,7 +399,11 @@ impl Into<'_> {
                 provenance,
                 ..Observation::manual(stamp, px)
             };
-            self.labels.push(name, observation).map_err(|e| at(row, e.to_string()))?;
+            let camera = match group.cameras.as_ref().map(|c| text(c, row)) {
+                None | Some(Some("")) => &self.camera,
+                Some(name) => name.ok_or_else(|| at(row, "camera is no UTF-8 text".to_string()))?,
+            };
+            self.labels.of(camera).push(name, observation).map_err(|e| at(row, e.to_string()))?;
             self.kept += 1;
         }
         Ok(())
