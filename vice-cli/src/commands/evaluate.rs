@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use vice_run::Samples;
 use vice_run::core::evaluate::SampleSink;
 use vice_run::core::metrics::align::Alignment;
-use vice_run::report::html::{IMAGE_BUDGET_BYTES, Run, render};
+use vice_run::report::html::{IMAGE_BUDGET_BYTES, render};
 use vice_run::report::{self, sample_lines};
 use vice_run::request::Scoring;
 use vice_run::require::{Requirement, broken};
 use vice_run::result::{MAX_SKIPPED_PERCENT, ResultDocument};
 
-use super::report::shots;
+use super::report::{PageArgs, run_of};
 use crate::inputs::{EvaluationArgs, on_off};
 use crate::outputs::Outputs;
 use crate::terminal::{self, Outcome, Verbosity, usage, with_progress};
@@ -77,9 +77,11 @@ struct OutputArgs {
     /// The table as LaTeX.
     #[arg(long, value_name = "FILE")]
     latex: Option<PathBuf>,
-    /// A page with the table, plots and images.
+    /// A page that says whether each estimate can be trusted, with the table, plots and images.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    page: PageArgs,
 }
 
 /// What becomes of the scored samples, of which a long run has millions.
@@ -100,6 +102,9 @@ fn percent(text: &str) -> Result<f64, String> {
 pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
     let samples = samples_file(args)?;
     let files = &args.output;
+    if files.report.is_none() {
+        files.page.refuse_without_a_page()?;
+    }
     let subsets = args.scoring.subsets.iter().map(|n| usize::from(*n)).collect();
     let mut request = args.evaluation.request(Scoring { subsets, align: args.scoring.align })?;
     request.depth.compare = args.scoring.depth_check.or(request.depth.compare);
@@ -118,8 +123,8 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     })?;
     let page = match &files.report {
         Some(path) => {
-            let shots = shots(&document, opened.dataset.as_ref(), IMAGE_BUDGET_BYTES, verbosity);
-            Some((path, render(&[Run::new(document.clone(), shots)])?))
+            let run = run_of(document.clone(), &request, &opened, IMAGE_BUDGET_BYTES, &files.page, verbosity);
+            Some((path, render(&[run])?))
         }
         None => None,
     };
