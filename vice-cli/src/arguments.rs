@@ -13,8 +13,8 @@ use crate::commands;
     name = "vice",
     version,
     arg_required_else_help = true,
-    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but too many labels could not be\n\
-                  scored, or something is wrong (check) or uncertain (clock).\n\
+    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but too many labels could not be \
+                  scored, or something is wrong (check) or uncertain (clock). \
                   Start with `vice demo`."
 )]
 pub(crate) struct Cli {

@@ -7,7 +7,7 @@ use crate::diagnosis::{Looking, diagnose_all};
 use crate::open::Opened;
 use crate::progress::{Progress, silent};
 use crate::report::assessment::{Assessment, Diagnosed};
-use crate::request::Request;
+use crate::request::{EstimateSpec, Request};
 use crate::text::with_options;
 
 impl Request {
@@ -46,8 +46,13 @@ impl Request {
 
     /// Adds what the checks find in a recording that is open.
     pub(crate) fn add_checks(&self, assessment: &mut Assessment, opened: &Opened) {
-        let request =
-            CheckRequest { dataset: self.dataset.clone(), streams: self.streams.clone(), images: false };
+        let mut streams = self.streams.clone();
+        // The integration starts at a key frame, of which a check knows nothing; it looks at the IMU itself.
+        let integrated: Vec<bool> = streams.estimates.iter().map(|e| *e == EstimateSpec::ImuEuler).collect();
+        let mut which = integrated.iter();
+        streams.names.retain(|_| which.next() != Some(&true));
+        streams.estimates.retain(|estimate| *estimate != EstimateSpec::ImuEuler);
+        let request = CheckRequest { dataset: self.dataset.clone(), streams, images: false };
         match check_opened(&request, opened, &silent) {
             Ok(document) => assessment.findings = Some(document.findings),
             Err(error) => {

@@ -22,9 +22,9 @@ use crate::terminal::{self, Outcome, Verbosity, usage, with_progress};
     vice evaluate V1_01_easy --labels floor.csv --estimate imu-euler,openvins.txt --depth floor,zmap\n  \
     vice evaluate my_run --labels labels.json --estimate rel:odometry.txt --reference none --depth zcam --json out.json\n  \
     vice evaluate my_run --labels auto --estimate odom --depth zcam   (labels without a hand)\n  \
-    vice evaluate --request out.json   (asks once more what out.json is the answer to)\n\n\
-    Lists repeat the option or take commas. Estimates are names of the data set's streams, `imu-euler` (Euler\n\
-    integration of its IMU from the reference state at the first key frame), or files: TUM, EuRoC CSV, KITTI with a\n\
+    vice evaluate --request out.json   (evaluates again what out.json is the result of)\n\n\
+    For several values repeat the option or separate them with commas. Estimates are names of the data set's streams, `imu-euler` (Euler \
+    integration of its IMU from the reference state at the first key frame), or files: TUM, EuRoC CSV, KITTI with a \
     times file, and relative motions as rel:FILE.\n\n\
     Exit code: 0 done, 1 failed, 2 wrong usage, 3 too many labels not scored, 4 a limit of --require is broken.")]
 pub(crate) struct Args {
@@ -40,23 +40,23 @@ pub(crate) struct Args {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Scoring")]
 struct ScoringArgs {
-    /// Numbers of points whose subsets are averaged over [default: those up to 3 that exist].
+    /// Average RMSE_2D over all subsets of this many points [default: 1, 2 and 3].
     #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..), conflicts_with = "request")]
     subsets: Vec<u16>,
     /// Alignment of the trajectory errors: none, first-pose, yaw, se3, sim3 [default: se3, and first-pose for imu-euler,
     /// which starts in the reference's own state].
     #[arg(long, value_name = "HOW", conflicts_with = "request")]
     align: Option<Alignment>,
-    /// Whether depths at key frames are compared with the recording's depth camera or scan, where these are not asked for
-    /// themselves [default: on].
+    /// Compare depths at key frames with the recording's depth camera or scan, if --depth does not name these
+    /// [default: on].
     #[arg(long, value_name = "on|off", action = clap::ArgAction::Set, value_parser = on_off, conflicts_with = "request")]
     depth_check: Option<bool>,
-    /// Exit with 3 if more labels than this could not be scored, percent. What an estimate carries behind the camera is warned of instead.
+    /// Exit with 3 if more than this share of labels could not be scored, percent. Points that an estimate carries behind the camera only give a warning.
     #[arg(long, value_name = "PERCENT", default_value_t = MAX_SKIPPED_PERCENT, value_parser = percent)]
     max_skipped: f64,
     /// Exit with 4 unless every estimate keeps these limits, such as 'rmse_2d<2px', 'age5s<3px' (five seconds since the key
     /// frame) or 'moved1m<40mm'; px, mrad or mm. The upper end of the 95 % interval has to be below, with rmse_2d.low and so
-    /// on the lower end. What could not be known breaks a limit.
+    /// on the lower end. A number that is missing breaks its limit.
     #[arg(long, value_name = "LIMIT,...", value_delimiter = ',')]
     require: Vec<Requirement>,
 }

@@ -21,8 +21,8 @@ use crate::terminal::{Outcome, Verbosity, printable, told, usage, with_progress}
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  vice report out.json --out report.html\n  \
     vice report monday.json tuesday.json --out week.html --dataset /archive/V1_01_easy\n\n\
-    The page is one file, asks no other for anything, and holds its images. They are read from the data set that the\n\
-    result names; where it has moved, --dataset says where to.")]
+    The page is one file with all its images. It begins with the answer: can each estimate be trusted, how far is it off, what is \
+    wrong, what to do. Images, diagnosis and checks read the data set that the result names; if it has moved, use --dataset.")]
 pub(crate) struct Args {
     /// Result documents, as `vice evaluate --json` writes them.
     #[arg(value_name = "RESULT.json", required = true)]

@@ -3,17 +3,16 @@
 //! An answer is never surer than what it rests on. Where nothing can be said it says so, with the numbers that are missing.
 
 use vice_core::diagnose::{DiagnosisDocument, VerdictKind};
-use vice_core::result::{Figure, PixelPart, Role};
+use vice_core::result::{Figure, PixelPart, Role, WindowPart};
 
 use super::assessment::Assessment;
-use super::held::{remarks, value_and_interval, window_name, windows};
+use super::held::{remarks, value_and_interval, window_name};
+use super::plots::NONE_PX;
 use crate::result::ResultDocument;
 use crate::text::{printable, with_options};
 
 /// Share of labels whose points are carried out of view above which RMSE_2D says little, percent.
 const MANY_AWAY_PERCENT: f64 = 10.0;
-/// Windows since the key frame that are told.
-const TOLD_WINDOWS: usize = 3;
 
 /// Whether an estimate can be trusted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,9 +62,6 @@ pub(crate) fn answer(document: &ResultDocument, part: &PixelPart, assessment: &A
     if let Some(how_far) = how_far(part) {
         lines.push(("How far off", how_far));
     }
-    if let Some(beside) = beside_the_reference(document, part) {
-        lines.push(("Beside the reference", beside));
-    }
     let mut trust = match diagnosed.map(|d| &d.outcome) {
         _ if part.scored == 0 => nothing_scored(part, &mut lines),
         Some(Ok(diagnosis)) => of_diagnosis(diagnosis, &mut lines),
@@ -88,16 +84,25 @@ pub(crate) fn answer(document: &ResultDocument, part: &PixelPart, assessment: &A
             ),
         ));
     }
-    let wrong = assessment.wrong_with(&part.stream);
-    for finding in &wrong {
+    let estimates: Vec<&str> =
+        document.pixel.iter().filter(|p| p.role == Role::Estimate).map(|p| p.stream.as_str()).collect();
+    let wrong = assessment.wrong_with(&part.stream, &estimates);
+    if let Some(finding) = wrong.first() {
         let mend = if finding.mend.is_empty() { String::new() } else { format!(" ({})", finding.mend) };
-        lines.push(("By the checks", sentence(&with_options(&format!("{}{mend}", finding.says)))));
+        let more = if wrong.len() > 1 { format!(" {} more below.", wrong.len() - 1) } else { String::new() };
+        let says = sentence(&with_options(&format!("{}{mend}", finding.says)));
+        lines.push(("By the checks", format!("{says}{more}")));
     }
     // A good number on shaky ground is no yes.
     if trust == Trust::Yes && (away > MANY_AWAY_PERCENT || !wrong.is_empty()) {
         trust = Trust::Unknown;
     }
-    lines.extend(remarks(part).into_iter().map(|remark| ("Careful", sentence(&remark))));
+    if let Some(beside) = beside_the_reference(document, part) {
+        lines.push(("Beside the reference", beside));
+    }
+    // The card says whose remarks they are.
+    let own = |remark: &str| remark.split_once(" depth): ").map_or(remark, |(_, rest)| rest).to_string();
+    lines.extend(remarks(part).iter().map(|remark| ("Careful", sentence(&own(remark)))));
     Answer { trust, lines }
 }
 
@@ -114,39 +119,50 @@ fn nothing_scored(part: &PixelPart, lines: &mut Vec<(&'static str, String)>) -> 
     Trust::Unknown
 }
 
-/// RMSE_2D with its interval in pixels, angles and millimetres, and how it grows.
+/// RMSE_2D with its interval, in pixels.
+pub(crate) fn size(part: &PixelPart) -> String {
+    match part.held_rmse_px.or(part.pooled_rmse_px) {
+        Some(value) if value < NONE_PX => format!("below {NONE_PX} px"),
+        Some(value) => format!("{} px", value_and_interval(value, part.interval_95)),
+        None => "no pixel error".to_string(),
+    }
+}
+
+/// RMSE_2D as angle and millimetres, what it rests on, and how it grows.
 fn how_far(part: &PixelPart) -> Option<String> {
-    let value = part.held_rmse_px.or(part.pooled_rmse_px)?;
+    part.held_rmse_px.or(part.pooled_rmse_px)?;
     let held = part.held.as_ref();
     let unit = |figure: Option<&Figure>, unit: &str| {
         figure.map(|f| format!("{} {unit}", value_and_interval(f.rmse, f.interval_95)))
     };
-    let of = match held {
-        Some(h) => format!("{} labels of {} points in {} segments", h.samples, h.points, h.segments),
-        None => format!("{} labels", part.scored),
-    };
-    let mut text = format!("RMSE_2D {} px", value_and_interval(value, part.interval_95));
     let others: Vec<String> =
         [unit(held.and_then(|h| h.mrad.as_ref()), "mrad"), unit(held.and_then(|h| h.mm.as_ref()), "mm")]
             .into_iter()
             .flatten()
             .collect();
+    let mut text = format!("RMSE_2D {}", size(part));
     if !others.is_empty() {
         text.push_str(&format!(", that is {}", others.join(" and ")));
     }
-    text.push_str(&format!(", over {of}"));
-    text.push_str(match part.interval_95 {
-        Some(_) => " [95 % interval].",
-        None => ". There is no interval: too few points or segments.",
+    text.push_str(&match held {
+        Some(h) => format!("; {} labels of {} points in {} segments", h.samples, h.points, h.segments),
+        None => format!("; {} labels", part.scored),
     });
-    let grown: Vec<String> = windows(part)
-        .filter_map(|w| Some(format!("{} px after {}", value_and_interval(w.px?.rmse, None), window_name(w))))
-        .collect();
-    if grown.len() > 1 {
-        // The first, the last and one between.
-        let step = (grown.len() - 1).div_ceil(TOLD_WINDOWS - 1).max(1);
-        let told: Vec<&str> = grown.iter().step_by(step).map(String::as_str).collect();
-        text.push_str(&format!(" Since the key frame: {}.", told.join(", ")));
+    text.push_str(match part.interval_95 {
+        Some(_) => ", 95 % intervals.",
+        None => ". No interval: too few points or segments.",
+    });
+    let shown = |w: &WindowPart| {
+        Some(format!("{} px after {}", value_and_interval(w.px?.rmse, None), window_name(w)))
+    };
+    let ages: Vec<String> = part.by_age.iter().filter_map(shown).collect();
+    let mut grown: Vec<&String> = ages.first().into_iter().chain(ages.last()).collect();
+    grown.dedup();
+    let far = part.by_distance.iter().filter_map(shown).next_back();
+    grown.extend(&far);
+    if !grown.is_empty() && part.held_rmse_px.or(part.pooled_rmse_px) >= Some(NONE_PX) {
+        let list: Vec<&str> = grown.into_iter().map(String::as_str).collect();
+        text.push_str(&format!(" Since the key frame: {}.", list.join(", ")));
     }
     Some(text)
 }
@@ -158,15 +174,17 @@ fn beside_the_reference(document: &ResultDocument, part: &PixelPart) -> Option<S
     let value = reference.held_rmse_px.or(reference.pooled_rmse_px)?;
     let own = part.held_rmse_px.or(part.pooled_rmse_px)?;
     let name = printable(&reference.stream);
-    let shown = value_and_interval(value, reference.interval_95);
-    let against = if own > 1.5 * value {
+    let shown = size(reference);
+    let against = if own.max(value) < NONE_PX {
+        "neither is off"
+    } else if own > 1.5 * value {
         "the estimate is the worse of the two"
     } else if value > 1.5 * own {
         "the reference is the worse of the two: labels, depth or calibration may suit it less"
     } else {
         "about the same: a difference would not show here"
     };
-    Some(format!("{name} itself comes to {shown} px; {against}."))
+    Some(format!("{name} itself comes to {shown}; {against}."))
 }
 
 fn of_diagnosis(diagnosis: &DiagnosisDocument, lines: &mut Vec<(&'static str, String)>) -> Trust {
@@ -178,7 +196,7 @@ fn of_diagnosis(diagnosis: &DiagnosisDocument, lines: &mut Vec<(&'static str, St
         VerdictKind::CannotTell | VerdictKind::Unexplained => Trust::No,
         _ => Trust::Unknown,
     };
-    let mut to_do: Vec<String> = verdict.corrections.iter().map(|c| sentence(&with_options(c))).collect();
+    let mut to_do: Vec<String> = verdict.corrections.iter().map(|c| to_do_words(c)).collect();
     to_do.extend(verdict.labels_that_help.iter().map(|help| format!("Label more: {}", sentence(help))));
     match verdict.kind {
         VerdictKind::Named if to_do.is_empty() => {
@@ -209,6 +227,12 @@ fn of_diagnosis(diagnosis: &DiagnosisDocument, lines: &mut Vec<(&'static str, St
         lines.push(("What these labels cannot show", blind));
     }
     trust
+}
+
+/// A correction as a sentence; an option is something to use.
+fn to_do_words(correction: &str) -> String {
+    let words = with_options(correction);
+    if words.starts_with("--") { format!("Use {}.", trimmed(&printable(&words))) } else { sentence(&words) }
 }
 
 /// Flaws of which these labels show nothing, or only some directions.
@@ -299,7 +323,7 @@ mod tests {
         }
         let (_, text) = answered(good(), &diagnosed("named", &["`time-offset` 0.05"], 1));
         assert!(
-            text.contains("What to do: --time-offset 0.05.") && text.contains("How sure: 99.9 %"),
+            text.contains("What to do: Use --time-offset 0.05.") && text.contains("How sure: 99.9 %"),
             "{text}"
         );
         let (_, text) = answered(good(), &diagnosed("too-few-labels", &[], 1));
@@ -330,11 +354,22 @@ mod tests {
         let mut assessment = diagnosed("no-flaw", &[], 1);
         assessment.findings = Some(vec![
             Finding::new("clock", "truth", State::Wrong, "another stream"),
-            Finding::new("clock", "truth, e", State::Wrong, "50 ms late").mend("`time-offset` -0.05"),
+            Finding::new("clock", "truth / e", State::Wrong, "50 ms late").mend("`time-offset` -0.05"),
         ]);
         let (trust, text) = answered(good(), &assessment);
         assert_eq!(trust, Trust::Unknown);
         assert!(text.contains("50 ms late (--time-offset -0.05)") && !text.contains("another"), "{text}");
+    }
+
+    #[test]
+    fn two_estimates_that_differ_accuse_neither() {
+        let mut assessment = diagnosed("no-flaw", &[], 1);
+        assessment.findings = Some(vec![Finding::new("clock", "e / other", State::Wrong, "other is late")]);
+        let both = document(vec![good(), part("other", &[sample("a", 1, 9.0)])]);
+        assert_eq!(answer(&both, &both.pixel[0], &assessment).trust, Trust::Yes);
+        // Against the recording's own sensor it counts.
+        let alone = document(vec![good()]);
+        assert_eq!(answer(&alone, &alone.pixel[0], &assessment).trust, Trust::Unknown);
     }
 
     #[test]

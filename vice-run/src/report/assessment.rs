@@ -34,11 +34,13 @@ impl Assessment {
         self.diagnoses.iter().find(|d| d.stream == stream && d.depth == depth)
     }
 
-    /// What is wrong with a stream by the checks.
-    pub(crate) fn wrong_with(&self, stream: &str) -> Vec<&Finding> {
+    /// What is wrong with an estimate by the checks: alone, or against something that is no estimate itself. Where two
+    /// estimates differ, either may be at fault.
+    pub(crate) fn wrong_with(&self, stream: &str, estimates: &[&str]) -> Vec<&Finding> {
         let about = |f: &&Finding| {
-            f.state == State::Wrong
-                && f.about.split([' ', ',']).any(|word| word == stream || f.about == stream)
+            let mut sides = f.about.split(" / ");
+            let is_other = |side: &str| side != stream && estimates.contains(&side);
+            f.state == State::Wrong && sides.clone().any(|s| s == stream) && !sides.any(is_other)
         };
         self.findings.iter().flatten().filter(about).collect()
     }

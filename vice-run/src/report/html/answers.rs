@@ -4,9 +4,8 @@ use maud::{Markup, html};
 use vice_core::check::{Finding, State};
 use vice_core::result::{PixelPart, Role};
 
-use crate::report::answer::{Answer, answer, sentence};
+use crate::report::answer::{Answer, answer, sentence, size};
 use crate::report::assessment::Assessment;
-use crate::report::held::value_and_interval;
 use crate::report::keys::{Key, of};
 use crate::result::ResultDocument;
 use crate::text::{printable, with_options};
@@ -50,13 +49,6 @@ fn card(key: &Key, part: &PixelPart, answer: &Answer) -> Markup {
                 @for (about, line) in &answer.lines { dt { (about) } dd { (line) } }
             }
         }
-    }
-}
-
-fn size(part: &PixelPart) -> String {
-    match part.held_rmse_px.or(part.pooled_rmse_px) {
-        Some(value) => format!("{} px", value_and_interval(value, part.interval_95)),
-        None => "no pixel error".to_string(),
     }
 }
 

@@ -95,7 +95,13 @@ fn section(run: &Run, place: usize, alone: bool) -> Markup {
             (tables::held_labels(document))
             (tables::doubts(document))
             h2 { "Over time" }
-            (plots(all_streams::all_streams(document, &keys, &timeline).into_iter().collect()))
+            (plots(
+                all_streams::all_streams(document, &keys, &timeline)
+                    .into_iter()
+                    .chain(coordinates::coordinates(document, &keys, &timeline))
+                    .chain(from_above::from_above(document, &keys))
+                    .collect()
+            ))
             h2 { "On the images" }
             (overlay::strip(marks.as_ref(), &keys, &run.shots, zero))
             @if let Some(marks) = &marks {
@@ -106,14 +112,6 @@ fn section(run: &Run, place: usize, alone: bool) -> Markup {
             @if !depths.is_empty() {
                 h2 { "Depth" }
                 (plots(depths))
-            }
-            @let ways: Vec<_> = from_above::from_above(document, &keys)
-                .into_iter()
-                .chain(coordinates::coordinates(document, &keys, &timeline))
-                .collect();
-            @if !ways.is_empty() {
-                h2 { "Where it went" }
-                (plots(ways))
             }
             h2 { "Each stream" }
             @if let Some((_, shot)) = shown {

@@ -41,7 +41,7 @@ impl Panel {
         picture.end();
         picture.line("axis", [(self.left, bottom), (right, bottom)]);
         if let Some(title) = y_title {
-            picture.text("title", (self.left - 34.0, self.top - 8.0), Anchor::Start, title);
+            picture.text("title", (self.left - 34.0, self.top - 12.0), Anchor::Start, title);
         }
         if let Some(title) = x_title {
             picture.text("", (right, bottom + 31.0), Anchor::End, title);

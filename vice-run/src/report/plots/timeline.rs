@@ -12,7 +12,7 @@ use crate::report::numbers::time_zero;
 use crate::result::ResultDocument;
 
 const PANEL_HEIGHT: f64 = 120.0;
-const BETWEEN: f64 = 40.0;
+const BETWEEN: f64 = 46.0;
 /// More key frames than this are marked by dots alone.
 const MAX_LINES: usize = 80;
 
@@ -49,7 +49,7 @@ impl Timeline {
 
     /// A picture with room for so many panels.
     pub(crate) fn picture(panels: usize) -> Picture {
-        Picture::new(WIDTH, panels as f64 * (PANEL_HEIGHT + BETWEEN) + 24.0)
+        Picture::new(WIDTH, panels as f64 * (PANEL_HEIGHT + BETWEEN) + 22.0)
     }
 
     /// Draws the panel at `index` of `panels`, and in it what `draw` draws.
@@ -63,7 +63,7 @@ impl Timeline {
     ) {
         let panel = Panel {
             left: LEFT,
-            top: 26.0 + index as f64 * (PANEL_HEIGHT + BETWEEN),
+            top: 30.0 + index as f64 * (PANEL_HEIGHT + BETWEEN),
             width: WIDTH - LEFT - RIGHT,
             height: PANEL_HEIGHT,
             x: self.x.clone(),
