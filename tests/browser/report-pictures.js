@@ -22,7 +22,7 @@ async function picture(name, { width, height, dark = false, print = false, at })
   const page = await context.newPage();
   await page.goto(address);
   if (print) await page.emulateMedia({ media: "print" });
-  if (at) await page.getByRole("heading", { name: at }).evaluate((heading) => heading.scrollIntoView());
+  if (at) await page.getByRole("heading", { name: at, exact: true }).evaluate((heading) => heading.scrollIntoView());
   await page.screenshot({ path: join(ROOT, "docs", name) });
   await context.close();
 }

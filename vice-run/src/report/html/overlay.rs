@@ -102,7 +102,7 @@ pub(crate) fn drawn(marks: &Marks, keys: &[Key], frame: &FrameMarks, shot: &Shot
         svg.push_str(&ring(label, size * 1.25, "c-label"));
         if names {
             let (x, y) = (label.u + size * 1.7, label.v - size * 1.1);
-            let _ = write!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{:.1}\">", size * 2.2);
+            let _ = write!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{:.1}\">", size * 2.5);
             push_escaped(&mut svg, &point.0.chars().take(16).collect::<String>());
             svg.push_str("</text>");
         }
