@@ -2,6 +2,7 @@
 
 use vice_core::result::Role;
 
+use super::marks::Carrier;
 use super::plots::estimate_class;
 use crate::result::ResultDocument;
 use crate::text::printable;
@@ -44,6 +45,12 @@ pub(crate) fn keys(document: &ResultDocument) -> Vec<Key> {
 /// The key of a stream.
 pub(crate) fn of<'a>(keys: &'a [Key], stream: &str, role: Role) -> Option<&'a Key> {
     keys.iter().find(|k| k.stream == stream && k.role == role)
+}
+
+/// The key of a stream on the images.
+pub(crate) fn of_carrier<'a>(keys: &'a [Key], carrier: &Carrier) -> Option<&'a Key> {
+    let role = if carrier.estimate.is_some() { Role::Estimate } else { Role::Reference };
+    of(keys, &carrier.name, role)
 }
 
 #[cfg(test)]

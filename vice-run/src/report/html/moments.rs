@@ -8,17 +8,10 @@ use vice_core::time::Stamp;
 use super::overlay::{data_uri, drawn};
 use crate::report::crops::{Around, Piece, PointPieces, SIDE};
 use crate::report::frames::Shots;
-use crate::report::keys::{Key, of};
-use crate::report::marks::{Carrier, Marks};
+use crate::report::keys::{Key, of_carrier};
+use crate::report::marks::Marks;
 use crate::report::numbers::px;
 use crate::text::printable;
-use vice_core::result::Role;
-
-/// The key of a carrier.
-pub(crate) fn key_of<'a>(keys: &'a [Key], carrier: &Carrier) -> Option<&'a Key> {
-    let role = if carrier.estimate.is_some() { Role::Estimate } else { Role::Reference };
-    of(keys, &carrier.name, role)
-}
 
 /// The worst moments, the worst first.
 pub(crate) fn moments(marks: &Marks, keys: &[Key], shots: &Shots, zero: Stamp) -> Markup {
@@ -75,7 +68,7 @@ fn one(
     seconds: &dyn Fn(Stamp) -> String,
 ) -> Markup {
     let key = match piece.around {
-        Around::Carried(carrier) => marks.carriers.get(carrier).and_then(|c| key_of(keys, c)),
+        Around::Carried(carrier) => marks.carriers.get(carrier).and_then(|c| of_carrier(keys, c)),
         _ => None,
     };
     let class = key.map_or("label", |k| k.class);

@@ -9,9 +9,8 @@ use vice_core::camera::Pixel;
 use vice_core::time::Stamp;
 
 use super::escape::push_escaped;
-use super::moments::key_of;
 use crate::report::frames::{Shot, Shots};
-use crate::report::keys::Key;
+use crate::report::keys::{Key, of_carrier};
 use crate::report::marks::{FrameMarks, Marks};
 use crate::text::printable;
 
@@ -83,7 +82,7 @@ pub(crate) fn drawn(marks: &Marks, keys: &[Key], frame: &FrameMarks, shot: &Shot
     for (point, mark) in frame {
         let Some(label) = mark.label_px.filter(|px| near(*px)) else { continue };
         for (index, px, _) in mark.carried.iter().filter(|c| near(c.1)) {
-            let key = marks.carriers.get(*index).and_then(|c| key_of(keys, c));
+            let key = marks.carriers.get(*index).and_then(|c| of_carrier(keys, c));
             let (class, id) = key.map_or(("ref", 0), |k| (k.class, k.id));
             let _ = write!(
                 svg,
