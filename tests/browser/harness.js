@@ -29,7 +29,7 @@ const children = new Set();
 after(() => children.forEach((child) => child.kill("SIGKILL")));
 
 /** @returns {string} */
-function program() {
+export function program() {
   const found = resolve(process.env.VICE_BIN ?? join(TARGET, "debug", "vice"));
   assert.ok(existsSync(found), `${found} is missing: run \`cargo build\`, or say in VICE_BIN where \`vice\` is`);
   return found;

@@ -22,7 +22,7 @@ function base64(bytes) {
  * @param {App} app
  * @param {(kind: "info" | "warning" | "error", text: string) => void} tell
  */
-export function bringIn(app, tell) {
+export function importLabels(app, tell) {
   const input = byId("import", HTMLInputElement);
   input.addEventListener("change", async () => {
     const file = input.files?.[0];
@@ -35,7 +35,7 @@ export function bringIn(app, tell) {
     const body = format === "pickle"
       ? /** @type {const} */ ({ content: base64(await file.arrayBuffer()), encoding: "base64", replace })
       : /** @type {const} */ ({ content: await file.text(), encoding: "text", replace });
-    if (await app.session.bringIn(format, body, file.name)) {
+    if (await app.session.importLabels(format, body, file.name)) {
       tell("info", `${file.name} is imported; undo takes it out again.`);
       app.select(app.labels.names[0] ?? "1");
     }

@@ -7,7 +7,7 @@ import { exportAddress, getState, ServerError } from "./api.js";
 import { App } from "./app.js";
 import { commands, disableWrites, listenToButtons, listenToKeys, showKeyHints } from "./commands.js";
 import { byId, setText } from "./dom.js";
-import { bringIn } from "./exchange.js";
+import { importLabels } from "./exchange.js";
 import { Guide } from "./guide.js";
 import { Help } from "./help.js";
 import { Images } from "./images.js";
@@ -100,7 +100,7 @@ async function open() {
   if (labels.state.floor_suggestions) setText(byId("suggest", HTMLElement), "Suggest on the floor");
   joinSwitches(app);
   speak(app);
-  bringIn(app, tell);
+  importLabels(app, tell);
   byId("speed", HTMLSelectElement).addEventListener("change", (event) => {
     player.speed = Number(/** @type {HTMLSelectElement} */ (event.target).value);
     viewer.marks.focus();

@@ -263,7 +263,7 @@ export class Session {
    * @param {string} name of the file
    * @returns {Promise<boolean>}
    */
-  bringIn(format, body, name) {
+  importLabels(format, body, name) {
     return this.#write(async () => {
       try {
         await this.#answered(await postImport(format, body));

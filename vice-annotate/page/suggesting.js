@@ -17,9 +17,9 @@ export async function suggest(app, tell, name) {
   const { frame } = app;
   const until = name === null ? null : (app.labels.nextFixed(name, frame)?.frame ?? null);
   try {
-    const { suggestions: list, lie } = await getSuggestions(frame, SUGGESTIONS, until);
+    const { suggestions: list, surface } = await getSuggestions(frame, SUGGESTIONS, until);
     app.suggested = { frame, list, name };
-    const said = list.length === 0 ? "There is no good place to suggest in this frame." : caution(app, lie);
+    const said = list.length === 0 ? "There is no good place to suggest in this frame." : caution(app, surface);
     if (said) tell("warning", said);
   } catch (error) {
     if (!(error instanceof ServerError)) throw error;
@@ -28,11 +28,11 @@ export async function suggest(app, tell, name) {
   app.changed();
 }
 
-/** @param {App} app @param {Suggestions["lie"]} lie @returns {string} */
-function caution(app, lie) {
+/** @param {App} app @param {Suggestions["surface"]} surface @returns {string} */
+function caution(app, surface) {
   const { state } = app.labels;
-  if (lie === "any" && state.depth_known) return "No depth is known in this frame: a key frame set here is not scored. Try another frame.";
-  if (lie === "below-horizon") return "No scan or depth camera tells the floor from walls here: take those that lie on the floor.";
-  if (lie === "depth" && state.floor_suggestions) return "No good corner was found on the floor of this frame: these lie elsewhere.";
+  if (surface === "any" && state.depth_known) return "No depth is known in this frame: a key frame set here is not scored. Try another frame.";
+  if (surface === "below-horizon") return "No scan or depth camera tells the floor from walls here: take those that lie on the floor.";
+  if (surface === "depth" && state.floor_suggestions) return "No good corner was found on the floor of this frame: these lie elsewhere.";
   return "";
 }

@@ -101,7 +101,7 @@
 /**
  * Where suggestions lie: on the floor as a scan or depth camera sees it; below the horizon, where that may be a wall;
  * where there is depth; anywhere.
- * @typedef {{suggestions: Suggestion[], lie: "floor" | "below-horizon" | "depth" | "any"}} Suggestions
+ * @typedef {{suggestions: Suggestion[], surface: "floor" | "below-horizon" | "depth" | "any"}} Suggestions
  */
 
 /**

@@ -13,16 +13,16 @@ use crate::commands;
     name = "vice",
     version,
     arg_required_else_help = true,
-    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but too many labels could not be\n\
-                  scored, or something is wrong (check) or uncertain (clock).\n\
+    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but too many labels could not be \
+                  scored, or something is wrong (check) or uncertain (clock). \
                   Start with `vice demo`."
 )]
 pub(crate) struct Cli {
-    /// Say only errors and results.
-    #[arg(short, long, global = true)]
+    /// Print only errors and results.
+    #[arg(short, long, global = true, display_order = 1000)]
     pub(crate) quiet: bool,
-    /// Say more; twice for everything.
-    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    /// Print more; -vv prints everything.
+    #[arg(short, long, global = true, action = clap::ArgAction::Count, display_order = 1001)]
     pub(crate) verbose: u8,
     #[command(subcommand)]
     pub(crate) command: Command,
@@ -33,9 +33,9 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Make a short flight, evaluate three estimates of it and explain the result.
     Demo(commands::demo::Args),
-    /// Say what is wrong with a recording, before any label.
+    /// Check a recording before you label it: clocks, conventions, gravity, calibration.
     Check(Box<commands::check::Args>),
-    /// Find by how much the clocks of two motion sources differ.
+    /// Find the offset between the clocks of two motion sources.
     Clock(commands::clock::Args),
     /// Compare calibrations.
     #[command(subcommand)]
@@ -48,40 +48,40 @@ pub(crate) enum Command {
     Trajectory(commands::trajectory::Args),
     /// Label key points in the browser, by hand and with a tracker.
     Annotate(Box<commands::annotate::Args>),
-    /// Write a vice.toml for a folder of images, or beside any data set: what it holds, and what cannot be known.
+    /// Write a vice.toml that describes a folder of images, or any data set; unknown values are marked.
     Init(commands::init::Args),
     /// Show what a data set holds.
     Info(commands::info::Args),
-    /// List the data set formats, built in and of plugins.
+    /// List the data set formats, built in and from plugins.
     Formats(commands::formats::Args),
     /// Check a plugin, or start a new one.
     #[command(subcommand)]
     Plugin(commands::plugin::Command),
-    /// Depth images of a frame from each source; `compare` for labelled key points.
+    /// Write depth images of a frame from each source; `compare` compares sources at labelled points.
     Depth(Box<commands::depth::Args>),
-    /// The floor plane.
+    /// Fit the floor plane.
     #[command(subcommand)]
     Floor(commands::floor::Command),
-    /// Show how RMSE_2D answers to each flaw, and which sizes the labels can show.
+    /// Show how RMSE_2D changes with each flaw, and how small a flaw the labels can show.
     Sensitivity(Box<commands::sensitivity::Args>),
     /// Write a rendered flight with exact labels and flawed estimates, in the EuRoC layout.
     Synth(commands::synth::Args),
-    /// Work with labels files.
+    /// Track, detect, compare and convert labels.
     #[command(subcommand)]
     Labels(commands::labels::Command),
     /// Write a pose stream of a data set as a trajectory file.
     Convert(commands::convert::Args),
     /// Show result documents as a page with plots and images.
     Report(commands::report::Args),
-    /// Draw labels and carried points on the images: a film, or a folder of frames.
+    /// Draw labels and estimates on the images: a film, or a folder of frames.
     Overlay(Box<commands::overlay::Args>),
-    /// Hold results side by side, label by label.
+    /// Compare results label by label.
     Compare(commands::compare::Args),
-    /// Evaluate many flights by one manifest; `collect` makes one table of the results.
+    /// Evaluate many flights listed in a manifest; `collect` makes one table of the results.
     Batch(Box<commands::batch::Args>),
     /// Show the results of a batch as the paper's table.
     Table(commands::table::Args),
-    /// Measure how fast points are projected here, beside the machine's limit.
+    /// Measure how fast this machine projects points, compared with its memory bandwidth.
     Bench(commands::bench::Args),
     /// Print completions for a shell.
     Completions(commands::completions::Args),

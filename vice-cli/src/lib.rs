@@ -26,6 +26,11 @@ pub fn commands() -> Vec<String> {
     Cli::command().get_subcommands().map(|c| c.get_name().to_string()).collect()
 }
 
+/// The command line with all commands and options, for what is made from it: manual pages and completions.
+pub fn command_line() -> clap::Command {
+    Cli::command()
+}
+
 /// Runs the program with the arguments of a command line, the first of which is its own name. Returns the exit code.
 ///
 /// `itself` says how the program is started once more, for the commands that need a process of their own. What a command

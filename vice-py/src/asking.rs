@@ -119,16 +119,16 @@ pub(crate) fn evaluate(
     progress: Option<Py<PyAny>>,
 ) -> Answer<Outcome> {
     let asked = Asked::new(run, labels, &estimates, reference, request)?;
-    let (document, dataset) = long(py, progress.as_ref(), move |progress| {
+    let (document, opened) = long(py, progress.as_ref(), move |progress| {
         let opened = asked.open()?;
         let samples = if samples { Samples::Keep } else { Samples::Drop };
         let mut document = asked.request.evaluate(&opened, samples, progress)?;
         if document.pixel.iter().all(|part| part.samples.is_empty()) {
             document.drop_samples();
         }
-        Ok((document, opened.dataset))
+        Ok((document, opened))
     })?;
-    Ok(Outcome::new(document, Some(dataset)))
+    Ok(Outcome::new(document, Some(opened)))
 }
 
 /// Evaluates what a request in a file, or that of a result document, asks for.
@@ -139,12 +139,12 @@ pub(crate) fn evaluate_request(
     path: PathBuf,
     progress: Option<Py<PyAny>>,
 ) -> Answer<Outcome> {
-    let (document, dataset) = long(py, progress.as_ref(), move |progress| {
+    let (document, opened) = long(py, progress.as_ref(), move |progress| {
         let request = Request::read(&path)?;
         let opened = request.open()?;
-        Ok((request.evaluate(&opened, Samples::Keep, progress)?, opened.dataset))
+        Ok((request.evaluate(&opened, Samples::Keep, progress)?, opened))
     })?;
-    Ok(Outcome::new(document, Some(dataset)))
+    Ok(Outcome::new(document, Some(opened)))
 }
 
 /// Finds the flaw that explains the pixel errors of one estimate with one depth source.

@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyType;
-use vice_run::core::dataset::Dataset;
 use vice_run::core::result::{PixelPart, Role, Sample};
 use vice_run::core::suspicion::Suspicion;
 use vice_run::error::RunError;
 use vice_run::files::atomic::{self, Overwrite};
+use vice_run::open::Opened;
+use vice_run::report::assessment::Assessment;
 use vice_run::report::comparison::{self, By};
 use vice_run::report::frames::Shots;
 use vice_run::report::html::{IMAGE_BUDGET_BYTES, Run, render};
@@ -27,12 +28,13 @@ use crate::work::{long, short};
 #[pyclass(frozen, name = "Result", module = "vicepose")]
 pub(crate) struct Outcome {
     document: Arc<ResultDocument>,
-    dataset: Option<Arc<dyn Dataset>>,
+    /// What was evaluated, where this result is of this process.
+    opened: Option<Opened>,
 }
 
 impl Outcome {
-    pub(crate) fn new(document: ResultDocument, dataset: Option<Arc<dyn Dataset>>) -> Self {
-        Self { document: Arc::new(document), dataset }
+    pub(crate) fn new(document: ResultDocument, opened: Option<Opened>) -> Self {
+        Self { document: Arc::new(document), opened }
     }
 
     /// The parts that names choose. A name that is both an estimate and the reference means the estimate.
@@ -230,27 +232,50 @@ impl Outcome {
         given_or_written(short(py, || latex::render(&self.document))?, path)
     }
 
-    /// Writes the page with the table, plots and images, with the bytes of ``vice evaluate --report``. The images are
-    /// read from the run that was evaluated; of a result that was read from a file, from ``run`` or from where it says.
-    #[pyo3(signature = (path, run = None, progress = None))]
+    /// Writes the page with the answers, the table, plots and images, with the bytes of ``vice evaluate --report``. The
+    /// images are read from the run that was evaluated; of a result that was read from a file, from ``run`` or from where
+    /// it says.
+    #[pyo3(signature = (path, run = None, progress = None, diagnosis = true))]
     fn report(
         &self,
         py: Python<'_>,
         path: PathBuf,
         run: Option<&Recording>,
         progress: Option<Py<PyAny>>,
+        diagnosis: bool,
     ) -> Answer<()> {
         let document = Arc::clone(&self.document);
-        let given = run.map(|run| Arc::clone(&run.dataset)).or_else(|| self.dataset.clone());
+        let given = run.map(|run| Arc::clone(&run.dataset));
+        let before = self.opened.clone();
         let page = long(py, progress.as_ref(), move |progress| {
-            let opened = given.map_or_else(|| document.request.dataset.open().map(|o| o.dataset), Ok);
-            let shots = match opened {
-                Ok(dataset) => Shots::of(&document, dataset.as_ref(), IMAGE_BUDGET_BYTES, &|done, total| {
-                    progress("reading images", done, total)
+            let request = &document.request;
+            let opened = match (given, before) {
+                (Some(dataset), before) => request.dataset.apply_to(dataset).map(|mut opened| {
+                    opened.in_memory = before.map(|b| b.in_memory).unwrap_or_default();
+                    opened
                 }),
-                Err(error) => Shots::missing(error.to_string()),
+                (None, Some(before)) => Ok(before),
+                (None, None) => request.dataset.open(),
             };
-            render(&[Run::new(document.as_ref().clone(), shots)])
+            let (shots, assessment) = match opened {
+                Ok(opened) => {
+                    let shots =
+                        Shots::of(&document, opened.dataset.as_ref(), IMAGE_BUDGET_BYTES, &|done, total| {
+                            progress("reading images", done, total)
+                        });
+                    let assessment = match diagnosis {
+                        true => request.assess(&opened, progress),
+                        false => Assessment::not_run("no diagnosis was asked for (`--no-diagnosis`)"),
+                    };
+                    (shots, assessment)
+                }
+                Err(error) => {
+                    let why = error.to_string();
+                    let assessment = Assessment::not_run(format!("no diagnosis could be made: {why}"));
+                    (Shots::missing(why), assessment)
+                }
+            };
+            render(&[Run::new(document.as_ref().clone(), shots, assessment)])
         })?;
         write(&path, page.as_bytes())
     }

@@ -19,8 +19,9 @@ use crate::auto_labels::TrackingSpec;
 use crate::error::{RunError, RunResult};
 use crate::evaluation::Samples;
 use crate::progress::Progress;
+use crate::report::assessment::{Assessment, Diagnosed};
 use crate::report::frames::Shots;
-use crate::report::html::{IMAGE_BUDGET_BYTES, Run, Section, render};
+use crate::report::html::{IMAGE_BUDGET_BYTES, Run, render};
 use crate::report::numbers::{first_and_last, mean};
 use crate::report::overlay::{Canvas, Colour, ESTIMATE_GREEN, ESTIMATE_YELLOW, LABEL_BLUE};
 use crate::report::table;
@@ -46,7 +47,7 @@ pub fn run(out: Option<&Path>, force: bool, progress: &Progress<'_>) -> RunResul
     if let Some(out) = out {
         write_euroc(&flight, out, force, &|done, total| progress("rendering the flight", done, total))?;
     }
-    let (document, verdicts) = evaluate_flight(&flight, out, progress)?;
+    let (document, diagnoses) = evaluate_flight(&flight, out, progress)?;
     let mut text =
         "A 10 s flight through a rendered room; four points on the floor are followed.\n".to_string();
     text.push_str("Three estimates of its motion are evaluated with two sources of depth at key frames:\n\n");
@@ -55,11 +56,11 @@ pub fn run(out: Option<&Path>, force: bool, progress: &Progress<'_>) -> RunResul
     text.push_str(&in_words(&document)?);
     text.push_str(&without_a_hand(progress)?);
     text.push_str("\nWhat `vice diagnose` makes of it, from the labels alone\n");
-    for line in &verdicts {
-        writeln!(text, "- {line}")?;
+    for diagnosed in &diagnoses {
+        writeln!(text, "- {}", verdict_line(diagnosed))?;
     }
     if let Some(out) = out {
-        keep(&flight, document, verdicts, out, progress)?;
+        keep(&flight, document, diagnoses, out, progress)?;
         text.push_str(&kept(out)?);
     } else {
         text.push_str("\nKeep the flight, the result and a picture with `vice demo --out demo_out`.\n");
@@ -71,7 +72,7 @@ pub fn run(out: Option<&Path>, force: bool, progress: &Progress<'_>) -> RunResul
 fn keep(
     flight: &Synthetic,
     document: ResultDocument,
-    verdicts: Vec<String>,
+    diagnoses: Vec<Diagnosed>,
     out: &Path,
     progress: &Progress<'_>,
 ) -> RunResult<()> {
@@ -79,11 +80,13 @@ fn keep(
     let picture = draw(flight, &document)?;
     // Read back what was rendered: to render it again would take as long as all the rest.
     let written = crate::formats::built_in().open(out, Some("euroc"), &OpenOptions::default())?;
-    let shots = Shots::of(&document, written.as_ref(), IMAGE_BUDGET_BYTES, &|done, total| {
+    let opened = document.request.dataset.apply_to(Arc::from(written))?;
+    let shots = Shots::of(&document, opened.dataset.as_ref(), IMAGE_BUDGET_BYTES, &|done, total| {
         progress("reading images", done, total);
     });
-    let mut run = Run::new(document, shots);
-    run.more.push(Section { title: "Diagnosis".to_string(), lines: verdicts });
+    let mut assessment = Assessment { diagnoses, findings: None, not_run: vec![] };
+    document.request.add_checks(&mut assessment, &opened);
+    let run = Run::new(document, shots, assessment);
     let page = render(&[run])?;
     for (name, bytes) in
         [("result.json", json.as_bytes()), ("overlay.png", &picture), ("report.html", page.as_bytes())]
@@ -98,7 +101,7 @@ fn evaluate_flight(
     flight: &Synthetic,
     kept: Option<&Path>,
     progress: &Progress<'_>,
-) -> RunResult<(ResultDocument, Vec<String>)> {
+) -> RunResult<(ResultDocument, Vec<Diagnosed>)> {
     let lacks = |what: &str| RunError::missing(format!("the flight has no {what}"));
     let camera_name = flight.cameras().into_iter().next().ok_or_else(|| lacks("camera"))?;
     let camera = flight.camera(&camera_name)?;
@@ -129,8 +132,8 @@ fn evaluate_flight(
         tracking: None,
     };
     let document = ResultDocument::new(request(kept), used, evaluate(&evaluation, &|_, _| {})?);
-    let verdicts = diagnose_estimates(&evaluation, progress)?;
-    Ok((document, verdicts))
+    let diagnoses = diagnose_estimates(&evaluation, progress)?;
+    Ok((document, diagnoses))
 }
 
 /// The same estimates by labels that nobody placed: the first seconds of the flight in small pictures, so that it takes no
@@ -172,23 +175,31 @@ fn request(kept: Option<&Path>) -> Request {
     request
 }
 
-/// The verdict on each estimate, with the first source of depth.
-fn diagnose_estimates(evaluation: &Evaluation<'_>, progress: &Progress<'_>) -> RunResult<Vec<String>> {
-    let mut verdicts = Vec::new();
+/// The diagnosis of each estimate, with the first source of depth.
+fn diagnose_estimates(evaluation: &Evaluation<'_>, progress: &Progress<'_>) -> RunResult<Vec<Diagnosed>> {
+    let mut diagnoses = Vec::new();
     for (stream, estimate) in evaluation.streams.iter().enumerate().filter(|(_, s)| s.role == Role::Estimate)
     {
         let options = Options::default();
         let diagnosis =
             Diagnosis { evaluation, stream, depth: 0, inertial: None, flaws: &Flaw::ALL, options };
         let diagnosed = diagnose(&diagnosis, &|done, total| progress("diagnosing", done, total))?;
-        let verdict = &diagnosed.document.verdict;
-        let mut line = format!("{}: {}", estimate.name, verdict.sentence);
-        if let Some(correction) = verdict.corrections.first() {
-            line.push_str(&format!(" ({correction})"));
-        }
-        verdicts.push(line);
+        let depth = evaluation.depths[0].name().to_string();
+        diagnoses.push(Diagnosed { stream: estimate.name.clone(), depth, outcome: Ok(diagnosed.document) });
     }
-    Ok(verdicts)
+    Ok(diagnoses)
+}
+
+/// A verdict and what corrects it, in a line.
+fn verdict_line(diagnosed: &Diagnosed) -> String {
+    match &diagnosed.outcome {
+        Ok(document) => {
+            let verdict = &document.verdict;
+            let correction = verdict.corrections.first().map(|c| format!(" ({c})")).unwrap_or_default();
+            format!("{}: {}{correction}", diagnosed.stream, verdict.sentence)
+        }
+        Err(why) => format!("{}: {why}", diagnosed.stream),
+    }
 }
 
 /// What the table shows, with its own numbers.

@@ -18,6 +18,7 @@
 //! Nothing here prints, and nothing knows a command line.
 #![forbid(unsafe_code)]
 
+mod assess;
 pub mod auto_labels;
 mod away;
 pub mod batch;

@@ -128,7 +128,7 @@ fn suggestions_say_where_they_lie() {
         assert!(!answer["suggestions"].as_array().unwrap().is_empty(), "{answer}");
         let depths: Vec<bool> =
             answer["suggestions"].as_array().unwrap().iter().map(|s| s["depth_m"].is_number()).collect();
-        (answer["lie"].as_str().unwrap().to_string(), depths.iter().all(|d| *d))
+        (answer["surface"].as_str().unwrap().to_string(), depths.iter().all(|d| *d))
     };
     assert_eq!(lie(&euroc.open(&[]), 1), ("floor".to_string(), true));
     // A reference of six seconds knows nothing of a later frame.

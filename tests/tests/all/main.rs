@@ -23,6 +23,7 @@ mod depth_oracle;
 mod detect;
 mod detect_rendered;
 mod diagnose;
+mod doc_commands;
 mod euroc_oracle;
 mod evaluate_oracle;
 mod fleet;

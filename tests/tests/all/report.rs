@@ -61,8 +61,18 @@ fn the_page_stands_alone_and_its_numbers_are_the_tables() {
     let embedded: Value = serde_json::from_str(embedded).unwrap();
     assert_eq!(embedded["pixel"][1]["rmse_px"], document["pixel"][1]["rmse_px"]);
     assert_eq!(embedded["trajectory"][0]["rmse_3d_m"], document["trajectory"][0]["rmse_3d_m"]);
-    // Seven labelled frames as pictures, and plots with words.
-    assert_eq!(page.matches("data:image/jpeg;base64,").count(), document_frames(&document));
+    // Each labelled frame as a small picture and once more to draw vectors on, and the worst at full resolution.
+    let pictures = page.matches("data:image/jpeg;base64,").count();
+    let moments = page.matches("class=\"moment\"").count();
+    assert_eq!(pictures, document_frames(&document) + 1 + moments);
+    assert!((3..=10).contains(&moments), "{moments}");
+    // The first screen, by diagnosis and checks.
+    assert!(
+        page.contains("Can imu-euler be trusted?")
+            && page.contains("What is wrong")
+            && page.contains("initial tilt")
+    );
+    assert!(page.contains(" checks</h3>"));
     assert!(page.matches("<svg class=\"plot\"").count() >= 10);
     assert_eq!(page.matches("<figure>").count(), page.matches("<svg class=\"plot\"").count());
     assert!(page.contains("vice evaluate "));
@@ -117,6 +127,27 @@ fn results_become_a_page_later_with_or_without_their_images() {
     ]));
     let both = std::fs::read_to_string(path("both.html")).unwrap();
     assert!(both.contains("2 runs") && both.contains("href=\"#run1\""));
+}
+
+/// A result of a small flight without a diagnosis of which nothing is claimed.
+#[test]
+fn a_page_says_when_it_was_made_only_if_asked_and_claims_nothing_without_a_diagnosis() {
+    let Some(data) = shared("data/euroc_v1_01") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let page = |name: &str, more: &[&str]| {
+        let (html, labels) = (folder.path().join(name), data.join("labels/floor.csv"));
+        let args =
+            ["evaluate", text(&data), "--labels", text(&labels), "--estimate", "imu-euler", "--no-diagnosis"];
+        good(vice(&[&args[..], &["--report", text(&html)], more].concat()));
+        std::fs::read_to_string(html).unwrap()
+    };
+    let plain = page("a.html", &[]);
+    assert_eq!(plain, page("b.html", &[]), "the same input makes the same bytes");
+    assert!(plain.contains("Not known") && plain.contains("--no-diagnosis") && !plain.contains("UTC on "));
+    let stamped = page("c.html", &["--stamp"]);
+    assert!(stamped.contains(" UTC on "));
+    let run = vice(&["evaluate", text(&data), "--labels", "floor.csv", "--stamp"]);
+    assert!(run.code == 2 && run.stderr.contains("--report"), "{}", run.stderr);
 }
 
 #[test]

@@ -240,7 +240,11 @@ pub(super) async fn export(State(app): Shared, Query(query): Query<FormatQuery>)
     .await
 }
 
-pub(super) async fn bring_in(State(app): Shared, Query(query): Query<FormatQuery>, body: Body) -> Answer {
+pub(super) async fn import_labels(
+    State(app): Shared,
+    Query(query): Query<FormatQuery>,
+    body: Body,
+) -> Answer {
     let format = Exchange::from_name(&query.format)?;
     let request: ImportRequest = parse(body)?;
     app.blocking(move |app| {

@@ -214,7 +214,7 @@ fn label_routes() -> Router<Arc<App>> {
         .route("/api/suggestions", get(suggestions::suggestions))
         .route("/api/projections", get(api::projections))
         .route("/api/export", get(api::export))
-        .route("/api/import", post(api::bring_in).layer(DefaultBodyLimit::max(MAX_IMPORT)))
+        .route("/api/import", post(api::import_labels).layer(DefaultBodyLimit::max(MAX_IMPORT)))
 }
 
 async fn page(State(app): State<Arc<App>>) -> Result<Response, ApiError> {

@@ -53,7 +53,7 @@ pub(super) async fn suggestions(State(app): Shared, Query(query): Query<SuggestQ
             store.document().points().filter_map(|(_, o)| Some(o.get(&stamp)?.px)).collect()
         };
         let pool = (POOL.0 * count).max(POOL.1);
-        let (lie, found) = places(desk, query.frame, &image, &taken, pool);
+        let (surface, found) = places(desk, query.frame, &image, &taken, pool);
         let ahead = Ahead::new(desk, &query);
         let candidates = ahead.candidates(&image, found);
         let far_px = 0.35 * f64::from(desk.camera.width()).hypot(f64::from(desk.camera.height()));
@@ -67,7 +67,7 @@ pub(super) async fn suggestions(State(app): Shared, Query(query): Query<SuggestQ
                 json!({ "u": found.px.u, "v": found.px.v, "score": found.score, "depth_m": z, "stays_s": stays_s })
             })
             .collect();
-        Ok(Json(json!({ "suggestions": list, "lie": lie })).into_response())
+        Ok(Json(json!({ "suggestions": list, "surface": surface })).into_response())
     })
     .await
 }
@@ -105,10 +105,10 @@ fn places(
         [(on_surest, &on_floor), ("depth", &has_depth), ("any", &|_| true)];
     accepts
         .into_iter()
-        .map(|(lie, accept)| {
+        .map(|(surface, accept)| {
             let options =
                 SuggestOptions { taken, accept, border_px: START_BORDER_PX, ..SuggestOptions::default() };
-            (lie, suggest(image, count, &options))
+            (surface, suggest(image, count, &options))
         })
         .find(|(_, found)| !found.is_empty())
         .unwrap_or(("any", vec![]))

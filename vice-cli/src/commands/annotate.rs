@@ -23,8 +23,8 @@ use crate::terminal::{self, Outcome, Verbosity, usage};
     vice annotate V1_01_easy --labels floor.json --fps 10 --duration 30\n  \
     vice annotate my_run --labels my.json --estimate openvins.txt --depth zmap --no-open\n  \
     vice annotate V1_01_easy --labels floor.json --fps 10 --review 30\n\n\
-    Labels are on the disk before the page says so; Ctrl-C ends the program. A CSV is not written over: its labels go\n\
-    on in a JSON beside it. What was done is kept in FILE.json.journal, with all steps for undo.\n\
+    Labels are on the disk before the page says so; Ctrl-C ends the program. A CSV is not written over: its labels go \
+    on in a JSON beside it. What was done is kept in FILE.json.journal, with all steps for undo. \
     In the page `?` shows the keys."
 )]
 pub(crate) struct Args {

@@ -21,8 +21,8 @@ use crate::terminal::{self, Outcome, Verbosity, printable, usage};
     vice batch flights.csv --out out --shard 2/4   (one of four machines)\n  \
     vice batch --scan /data/flights flights.csv   (writes a manifest of what is there)\n  \
     vice batch collect out\n\n\
-    A row of the manifest is a run: run_id, group, dataset, and any option of `vice evaluate` by its name. Paths are\n\
-    relative to the manifest. What is in --out already is not run again, so that resuming is running again.\n\n\
+    A row of the manifest is a run: run_id, group, dataset, and any option of `vice evaluate` by its name. Paths are \
+    relative to the manifest. Runs that are in --out already are skipped, so run the same command again to resume.\n\n\
     Exit code: 0 done, 1 failed or a run failed, 2 wrong usage, 130 stopped by a signal.")]
 pub(crate) struct Args {
     #[command(subcommand)]

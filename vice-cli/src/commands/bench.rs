@@ -14,7 +14,7 @@ use crate::terminal::{self, Outcome, Verbosity, with_progress};
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  vice bench project --points 1000000\n  vice bench track --model equidistant --threads 2 --json bench.json\n\n\
-    Each number is the best of many rounds, the limit measured in the same rounds: a busy machine makes both worse,\n\
+    Each number is the best of many rounds, the limit measured in the same rounds: a busy machine makes both worse, \
     their ratio less so. What a limit is stands in docs/performance.md."
 )]
 pub(crate) struct Args {

@@ -15,7 +15,7 @@ use crate::terminal::{self, Outcome, Verbosity, with_progress};
 #[command(
     mut_arg("path", |a| a.required(false).required_unless_present("list")),
     after_help = "Examples:\n  vice check V1_01_easy\n  vice check my_run --estimate odom.tum,slam.tum --json found.json\n  vice check my_run --images\n  vice check today --images --before last_week\n  vice check --list\n\n\
-    Exit codes: 0 nothing is wrong, 3 something is wrong, else as ever. `unknown` is no praise: its line says why."
+    Exit codes: 0 nothing is wrong, 3 something is wrong, others as for every command. `unknown` does not mean that it is right: its line says why."
 )]
 pub(crate) struct Args {
     #[command(flatten)]

@@ -13,8 +13,8 @@ use crate::terminal::{self, Outcome};
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  vice clock ground_truth.csv estimate.txt\n  vice clock mav0/imu0/data.csv estimate.txt\n  vice clock imu ground-truth --dataset V1_01_easy\n\n\
-    The offset is what is added to the stamps of the second: what --time-offset takes. Both must turn; neither frame\n\
-    nor world matters. Exit codes: 0 it is known, 3 it is too uncertain, else as ever."
+    The offset is added to the stamps of the second, as --time-offset does. Both must rotate; their body and world frames \
+    do not matter. Exit codes: 0 found, 3 too uncertain, others as for every command."
 )]
 pub(crate) struct Args {
     /// File of poses or inertial samples whose clock is kept; with --dataset also imu or the name of a stream.

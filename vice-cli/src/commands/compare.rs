@@ -15,8 +15,8 @@ use crate::terminal::{self, Outcome, printable, usage};
     vice compare out.json --by depths --csv depths.csv\n  \
     vice compare old/*.json new/*.json   (flight by flight, and over all flights)\n  \
     vice compare baseline.json today.json --fail-above 0.5   (for CI: exit code 1 if an estimate got worse by more)\n\n\
-    Differences are paired: at each label that both results scored, B minus A. The interval comes from resampling\n\
-    points and segments; where it holds zero, the two cannot be told apart by these labels.")]
+    Differences are paired: at each label that both results scored, B minus A. The interval comes from resampling \
+    points and segments; if it contains zero, these labels show no difference.")]
 pub(crate) struct Args {
     /// Result documents with their samples, as `vice evaluate --json` writes them; the first of a recording
     /// is what its others are held against.

@@ -18,7 +18,7 @@ use crate::terminal::{self, Outcome, Verbosity, usage, with_progress};
     vice diagnose V1_01_easy --labels floor.csv --estimate openvins.txt\n  \
     vice diagnose my_run --labels labels.json --estimate odom --depth zcam --apply corrected.toml\n  \
     vice evaluate my_run --labels labels.json --estimate odom --depth zcam --calibration corrected.toml\n\n\
-    Every value is the error of what is in use: a clock offset of +50 ms means that the estimate's stamps, with\n\
+    Each value is the error of what you use now: a clock offset of +50 ms means that the estimate's stamps, with \
     --time-offset added, are 50 ms too late, and is corrected by a --time-offset that is 50 ms less.")]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -42,7 +42,7 @@ pub(crate) struct LookingArgs {
     /// rolling-shutter.
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     flaws: Vec<Flaw>,
-    /// How much the odometry may wander and still be healthy, a root second: 5mm,0.06deg, or wheel, vio, mocap.
+    /// How much a healthy odometry drifts at random, per root second: 5mm,0.06deg, or wheel, vio, mocap.
     #[arg(long, value_name = "NOISE", default_value = "vio")]
     odometry_noise: OdometryNoise,
     /// No longer means anything: intervals come from the noise of labels and poses, not from resampling.

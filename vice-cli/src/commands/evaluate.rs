@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use vice_run::Samples;
 use vice_run::core::evaluate::SampleSink;
 use vice_run::core::metrics::align::Alignment;
-use vice_run::report::html::{IMAGE_BUDGET_BYTES, Run, render};
+use vice_run::report::html::{IMAGE_BUDGET_BYTES, render};
 use vice_run::report::{self, sample_lines};
 use vice_run::request::Scoring;
 use vice_run::require::{Requirement, broken};
 use vice_run::result::{MAX_SKIPPED_PERCENT, ResultDocument};
 
 use super::evaluate_rig::{self, Files};
-use super::report::shots;
+use super::report::{PageArgs, run_of};
 use crate::inputs::{EvaluationArgs, on_off};
 use crate::outputs::Outputs;
 use crate::terminal::{self, Outcome, Verbosity, usage, with_progress};
@@ -23,10 +23,11 @@ use crate::terminal::{self, Outcome, Verbosity, usage, with_progress};
     vice evaluate V1_01_easy --labels floor.csv --estimate imu-euler,openvins.txt --depth floor,zmap\n  \
     vice evaluate my_run --labels labels.json --estimate rel:odometry.txt --reference none --depth zcam --json out.json\n  \
     vice evaluate my_run --labels auto --estimate odom --depth zcam   (labels without a hand)\n  \
-    vice evaluate my_run --camera cam0,cam1 --labels labels_{camera}.csv --estimate odom   (each camera, and together)\n  \
-    vice evaluate --request out.json   (asks once more what out.json is the answer to)\n\n\
-    Lists repeat the option or take commas. Estimates are names of the data set's streams, `imu-euler` (Euler\n\
-    integration of its IMU from the reference state at the first key frame), or files: TUM, EuRoC CSV, KITTI with a\n\
+    vice evaluate my_run --camera cam0,cam1 --labels labels_{camera}.csv --estimate odom   (each camera, and together)
+  \
+    vice evaluate --request out.json   (evaluates again what out.json is the result of)\n\n\
+    For several values repeat the option or separate them with commas. Estimates are names of the data set's streams, `imu-euler` (Euler \
+    integration of its IMU from the reference state at the first key frame), or files: TUM, EuRoC CSV, KITTI with a \
     times file, and relative motions as rel:FILE.\n\n\
     Exit code: 0 done, 1 failed, 2 wrong usage, 3 too many labels not scored, 4 a limit of --require is broken.")]
 pub(crate) struct Args {
@@ -42,23 +43,23 @@ pub(crate) struct Args {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Scoring")]
 struct ScoringArgs {
-    /// Numbers of points whose subsets are averaged over [default: those up to 3 that exist].
+    /// Average RMSE_2D over all subsets of this many points [default: 1, 2 and 3].
     #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..), conflicts_with = "request")]
     subsets: Vec<u16>,
     /// Alignment of the trajectory errors: none, first-pose, yaw, se3, sim3 [default: se3, and first-pose for imu-euler,
     /// which starts in the reference's own state].
     #[arg(long, value_name = "HOW", conflicts_with = "request")]
     align: Option<Alignment>,
-    /// Whether depths at key frames are compared with the recording's depth camera or scan, where these are not asked for
-    /// themselves [default: on].
+    /// Compare depths at key frames with the recording's depth camera or scan, if --depth does not name these
+    /// [default: on].
     #[arg(long, value_name = "on|off", action = clap::ArgAction::Set, value_parser = on_off, conflicts_with = "request")]
     depth_check: Option<bool>,
-    /// Exit with 3 if more labels than this could not be scored, percent. What an estimate carries behind the camera is warned of instead.
+    /// Exit with 3 if more than this share of labels could not be scored, percent. Points that an estimate carries behind the camera only give a warning.
     #[arg(long, value_name = "PERCENT", default_value_t = MAX_SKIPPED_PERCENT, value_parser = percent)]
     max_skipped: f64,
     /// Exit with 4 unless every estimate keeps these limits, such as 'rmse_2d<2px', 'age5s<3px' (five seconds since the key
     /// frame) or 'moved1m<40mm'; px, mrad or mm. The upper end of the 95 % interval has to be below, with rmse_2d.low and so
-    /// on the lower end. What could not be known breaks a limit.
+    /// on the lower end. A number that is missing breaks its limit.
     #[arg(long, value_name = "LIMIT,...", value_delimiter = ',')]
     require: Vec<Requirement>,
 }
@@ -79,9 +80,11 @@ struct OutputArgs {
     /// The table as LaTeX.
     #[arg(long, value_name = "FILE")]
     latex: Option<PathBuf>,
-    /// A page with the table, plots and images.
+    /// A page that says whether each estimate can be trusted, with the table, plots and images.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    page: PageArgs,
 }
 
 /// What becomes of the scored samples, of which a long run has millions.
@@ -102,6 +105,9 @@ fn percent(text: &str) -> Result<f64, String> {
 pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> {
     let samples = samples_file(args)?;
     let files = &args.output;
+    if files.report.is_none() {
+        files.page.refuse_without_a_page()?;
+    }
     let subsets = args.scoring.subsets.iter().map(|n| usize::from(*n)).collect();
     let mut request = args.evaluation.request(Scoring { subsets, align: args.scoring.align })?;
     request.depth.compare = args.scoring.depth_check.or(request.depth.compare);
@@ -129,8 +135,8 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     })?;
     let page = match &files.report {
         Some(path) => {
-            let shots = shots(&document, opened.dataset.as_ref(), IMAGE_BUDGET_BYTES, verbosity);
-            Some((path, render(&[Run::new(document.clone(), shots)])?))
+            let run = run_of(document.clone(), &request, &opened, IMAGE_BUDGET_BYTES, &files.page, verbosity);
+            Some((path, render(&[run])?))
         }
         None => None,
     };

@@ -14,7 +14,7 @@ use crate::terminal::{Outcome, Verbosity, printable};
 /// Arguments of `vice formats`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: vice formats --plugin libvice_adapter_myrobot.so\n\n\
-    Plugins are also loaded from the folders and files of VICE_PLUGIN_PATH and from the user's data folder (on Linux\n\
+    Plugins are also loaded from the folders and files of VICE_PLUGIN_PATH and from the user's data folder (on Linux \
     ~/.local/share/vice/plugins).")]
 pub(crate) struct Args {
     #[command(flatten)]

@@ -20,7 +20,7 @@ const FILMS: [&str; 3] = ["mp4", "mov", "mkv"];
 #[command(after_help = "Examples:\n  \
     vice overlay V1_01_easy --labels floor.csv --estimate imu-euler --out film.mp4\n  \
     vice overlay my_run --labels labels.json --estimate slam.txt --out frames/\n\n\
-    Blue rings: labels (filled at key frames); red: the reference; green and other colours: the estimates. The\n\
+    Blue rings: labels (filled at key frames); red: the reference; green and other colours: the estimates. The \
     labelled frames are shown, with what --fps, --start and --duration leave of them. A film needs FFmpeg on the PATH.")]
 pub(crate) struct Args {
     #[command(flatten)]

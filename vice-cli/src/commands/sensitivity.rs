@@ -15,9 +15,9 @@ use crate::terminal::{self, Outcome, Verbosity, with_progress};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     vice sensitivity V1_01_easy --labels floor.csv --estimate ground-truth --plot sensitivity.svg\n\n\
-    Each flaw is injected into what is in use, both ways round, at growing size. `seen from` is the size at which\n\
-    RMSE_2D is a tenth larger than it is now; `found from` the smallest size that `vice diagnose` finds nineteen times\n\
-    of twenty. Labels that cannot show a flaw say `never` there.")]
+    Each flaw is added to what you use now, with both signs, at growing size. `seen from` is the size at which \
+    RMSE_2D is a tenth larger than it is now; `found from` the smallest size that `vice diagnose` finds nineteen times \
+    of twenty. Where the labels cannot show a flaw it says `never`.")]
 pub(crate) struct Args {
     #[command(flatten)]
     evaluation: EvaluationArgs,

@@ -21,8 +21,8 @@ use crate::terminal::{self, Outcome, Verbosity, usage};
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example: vice trajectory ground_truth.csv estimate.txt --align se3 --delta 1 --delta-unit meters --all-pairs\n\n\
-    Files are tables with a heading that names the columns, else TUM, EuRoC CSV or KITTI by their content, or relative\n\
-    motions as rel:FILE. A data set is its ground truth or its only stream; DATASET:STREAM is another, as run.bag:/odom or\n\
+    Files are tables with a heading that names the columns, else TUM, EuRoC CSV or KITTI by their content, or relative \
+    motions as rel:FILE. A data set is its ground truth or its only stream; DATASET:STREAM is another, as run.bag:/odom or \
     run.bag:/tf:map.base_link.\n\n\
     Several estimates make one table and one plot: vice trajectory V1_01_easy vins.txt orb.txt --align se3 --plot all.svg"
 )]

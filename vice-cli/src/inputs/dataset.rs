@@ -11,10 +11,10 @@ use vice_run::request::{DatasetSpec, PluginsSpec};
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Data set")]
 pub(crate) struct DatasetArgs {
-    /// Folder or file of the data set; in a build for that its address, such as s3://bucket/run.mcap.
+    /// Folder or file of the data set, or its address such as s3://bucket/run.mcap in a build with the feature `remote`.
     #[arg(value_name = "DATASET", required = true)]
     pub(crate) path: Option<PathBuf>,
-    /// Format of the data set [default: found by looking].
+    /// Format of the data set [default: detected].
     #[arg(long, value_name = "NAME")]
     pub(crate) format: Option<String>,
     /// Setting of the format; `vice formats` lists them.
@@ -30,7 +30,7 @@ pub(crate) struct DatasetArgs {
 /// Which plugins are loaded beside those in `VICE_PLUGIN_PATH` and the user's folder.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(crate) struct PluginArgs {
-    /// Plugin to load, a shared library; goes before a built-in format of the same name. May be repeated.
+    /// Plugin to load, a shared library; replaces a built-in format of the same name. May be repeated.
     #[arg(long = "plugin", value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
     /// Load plugins even from files or folders that others may write to.

@@ -19,7 +19,7 @@ pub(crate) struct CalibrationArgs {
     /// Calibration that overrides the data set's: TOML, or that of Kalibr, OpenVINS, ROS, OpenCV, ORB-SLAM, VINS, Basalt, COLMAP.
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
-    /// Intrinsics in pixels, in place of the calibration's.
+    /// Intrinsics in pixels, instead of the calibration's.
     #[arg(long, value_name = "FX,FY,CX,CY", allow_hyphen_values = true, value_parser = numbers::<4>)]
     intrinsics: Option<[f64; 4]>,
     /// Lens in place of the calibration's: pinhole, or a model with its coefficients: radtan, rational, equidistant, ds, eucm,
@@ -50,7 +50,7 @@ pub(crate) struct DepthArgs {
     /// Thin the cloud to one point for each cube of this size, metres.
     #[arg(long, value_name = "M", value_parser = positive)]
     cloud_voxel: Option<f64>,
-    /// Depth camera readings outside of these are not trusted, metres.
+    /// Ignore depth camera readings outside this range, metres.
     #[arg(long, value_name = "NEAR,FAR", value_parser = numbers::<2>)]
     zcam_range: Option<[f64; 2]>,
     /// Side of the tags for the depth source tag: the dark border's outside, metres.
@@ -59,13 +59,13 @@ pub(crate) struct DepthArgs {
     /// Family of the tags for the depth source tag: 36h11, 25h9 or 16h5 [default: 36h11].
     #[arg(long, value_name = "FAMILY")]
     tag_family: Option<TagFamily>,
-    /// Second camera for the depth source stereo [default: the only other one].
+    /// Second camera for the depth source stereo [default: the only other camera].
     #[arg(long, value_name = "NAME")]
     stereo_camera: Option<String>,
-    /// Scan of the scene in place of the data set's: PLY, PCD, LAS or LAZ, metres.
+    /// Scan of the scene, instead of the data set's: PLY, PCD, LAS or LAZ, metres.
     #[arg(long, value_name = "FILE")]
     cloud: Option<PathBuf>,
-    /// Faces of the scene in place of the data set's: a PLY file, metres.
+    /// Mesh of the scene, instead of the data set's: a PLY file, metres.
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// File with the place of cloud and mesh in the world: x y z qx qy qz qw, or a 4x4 matrix [default: they are in the world's
@@ -91,7 +91,7 @@ pub(crate) struct AnchorArgs {
     /// Pose stream or file that places the camera [default: ground-truth where there is one].
     #[arg(long, value_name = "NAME|FILE")]
     reference: Option<String>,
-    /// Widest gap between two poses that is interpolated, seconds.
+    /// Longest gap between two poses to interpolate over, seconds.
     #[arg(long, value_name = "S", default_value = "0.1", value_parser = span_not_negative)]
     pub(crate) max_gap: Span,
 }

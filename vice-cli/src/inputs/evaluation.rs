@@ -80,7 +80,7 @@ pub(crate) struct EvaluationArgs {
     depth: Vec<String>,
     #[command(flatten)]
     depth_options: DepthArgs,
-    /// Ask what this file asks, a request or a result document, in place of all options above.
+    /// Repeat the request in this file, a request or a result document; replaces all options above.
     #[arg(
         long,
         value_name = "FILE.json",
@@ -113,13 +113,13 @@ pub(crate) struct LabelArgs {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Labels")]
 pub(crate) struct WindowArgs {
-    /// Keep the frame nearest to each tick of this rate, and every key frame [default: every labelled frame].
+    /// Frames a second: keep the frame nearest to each tick, and every key frame [default: every labelled frame].
     #[arg(long, value_name = "HZ", value_parser = positive)]
     fps: Option<f64>,
-    /// Seconds after the camera's first frame.
+    /// Start this many seconds after the camera's first frame.
     #[arg(long, value_name = "S", default_value = "0", allow_hyphen_values = true, value_parser = span_not_negative)]
     start: Span,
-    /// Seconds from there [default: to the end].
+    /// Stop after this many seconds [default: at the end].
     #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = span_not_negative)]
     duration: Option<Span>,
 }

@@ -12,10 +12,10 @@ use crate::terminal::usage;
 /// What estimates are compared with, and how their poses are read.
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct PoseArgs {
-    /// What they are compared with, or none [default: ground-truth where there is one].
+    /// Reference that the estimates are compared with, or none [default: ground-truth if there is one].
     #[arg(long, value_name = "NAME|FILE|none")]
     reference: Option<String>,
-    /// Whose poses the estimates give: body, camera, or a file with body_from_estimate (4x4).
+    /// Frame that the estimates' poses are of: body, camera, or a file with body_from_estimate (4x4).
     #[arg(long, value_name = "body|camera|FILE", default_value = "body")]
     estimate_frame: EstimateFrame,
     /// What the estimates are, where that is not what they are read as: inverse, wxyz, conjugate, camera, mm, cm, ft,
@@ -28,7 +28,7 @@ pub(crate) struct PoseArgs {
     /// Seconds added to the stamps of the estimates [default: 0, or what --calibration says].
     #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = span)]
     time_offset: Option<Span>,
-    /// Widest gap between two poses that is interpolated, seconds.
+    /// Longest gap between two poses to interpolate over, seconds.
     #[arg(long, value_name = "S", default_value = "0.1", value_parser = span_not_negative)]
     max_gap: Span,
 }

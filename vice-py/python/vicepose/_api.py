@@ -315,15 +315,18 @@ def report(
     out: PathLike,
     *,
     run: Run | PathLike | None = None,
+    diagnosis: bool = True,
     progress: Progress = False,
 ) -> None:
-    """Writes a result as a page with plots and images: what ``vice report`` does with one result.
+    """Writes a result as a page that says whether each estimate can be trusted, with plots and images: what
+    ``vice report`` does with one result.
 
-    ``run`` says where the recording is now, where it has moved.
+    ``run`` says where the recording is now, where it has moved. ``diagnosis=False`` leaves out the diagnosis and the
+    checks, which take longer than the page.
     """
     result = results if isinstance(results, Result) else Result.read(results)
     with shown(progress) as told:
-        result.report(out, None if run is None else open(run), told)
+        result.report(out, None if run is None else open(run), told, diagnosis)
 
 
 def formats(plugins: Sequence[PathLike] = (), *, allow_writable_plugin: bool = False) -> list[dict[str, Any]]:

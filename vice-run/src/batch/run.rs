@@ -19,6 +19,7 @@ use super::store::{Keep, RowRecord, Store};
 use crate::error::{RunError, RunResult};
 use crate::evaluation::Samples;
 use crate::progress::silent;
+use crate::report::assessment::Assessment;
 use crate::report::frames::Shots;
 use crate::report::html;
 use crate::request::Request;
@@ -312,11 +313,16 @@ fn evaluated(request: &Request, key: &Key, shared: &Shared<'_>) -> RunResult<Res
         if shared.keep.samples {
             samples::write_kept(&samples_path, &document)?;
         }
-        let page = html::render(&[html::Run::new(document.clone(), Shots::default())])?;
+        let page = html::render(&[html::Run::new(document.clone(), Shots::default(), not_diagnosed())])?;
         shared.store.write_report(key, &page)?;
     }
     document.drop_samples();
     Ok(document)
+}
+
+/// A batch is about many flights: what is wrong with one of them is asked of it alone.
+fn not_diagnosed() -> Assessment {
+    Assessment::not_run("no diagnosis is made in a batch: `vice diagnose` makes it of one run")
 }
 
 /// An error on one line, with paths as the manifest has them.

@@ -77,7 +77,22 @@ pub(super) fn gather(request: &CheckRequest, raw: Arc<dyn Dataset>) -> RunResult
         }
     };
     let dataset = opened.as_ref().map_or(raw, |o| Arc::clone(&o.dataset));
-    let camera = opened.as_ref().map(|o| o.camera_name.clone());
+    gather_of(request, dataset, opened.as_ref(), read)
+}
+
+/// Reads what is small of a recording that is open with its overrides.
+pub(super) fn gather_opened(request: &CheckRequest, opened: &Opened) -> RunResult<Gathered> {
+    gather_of(request, Arc::clone(&opened.dataset), Some(opened), Vec::new())
+}
+
+fn gather_of(
+    request: &CheckRequest,
+    dataset: Arc<dyn Dataset>,
+    opened: Option<&Opened>,
+    read: Vec<Finding>,
+) -> RunResult<Gathered> {
+    let spec = &request.dataset;
+    let camera = opened.map(|o| o.camera_name.clone());
     let mut gathered = Gathered {
         cameras: match &camera {
             Some(camera) if spec.camera.is_some() => vec![camera.clone()],
@@ -96,8 +111,8 @@ pub(super) fn gather(request: &CheckRequest, raw: Arc<dyn Dataset>) -> RunResult
         Ok(imu) => gathered.imu = imu,
         Err(error) => gathered.read.push(unread(IMU, &error)),
     }
-    gathered.streams(request, opened.as_ref())?;
-    if let Some(opened) = &opened {
+    gathered.streams(request, opened)?;
+    if let Some(opened) = opened {
         gathered.suspicions.extend(opened.suspicions());
     }
     if let Some(spec) = &request.before {

@@ -27,6 +27,7 @@ pub use text::{head, list_text, render};
 
 use crate::error::{RunError, RunResult};
 use crate::formats;
+use crate::open::Opened;
 use crate::progress::Progress;
 use crate::request::{DatasetSpec, Request, StreamsSpec};
 
@@ -113,7 +114,26 @@ pub fn check_open(
         return Err(RunError::usage("before", "compares what the images of both recordings say")
             .advise("give `images`"));
     }
-    let gathered = gather::gather(request, dataset)?;
+    checked(request, &gather::gather(request, dataset)?, progress)
+}
+
+/// Checks a recording that is open with the overrides of the request in place.
+///
+/// # Errors
+/// As [`check`].
+pub fn check_opened(
+    request: &CheckRequest,
+    opened: &Opened,
+    progress: &Progress<'_>,
+) -> RunResult<CheckDocument> {
+    checked(request, &gather::gather_opened(request, opened)?, progress)
+}
+
+fn checked(
+    request: &CheckRequest,
+    gathered: &gather::Gathered,
+    progress: &Progress<'_>,
+) -> RunResult<CheckDocument> {
     let mut findings = gathered.findings(request.images.then_some(progress));
     findings.sort_by_key(place);
     let count = |state: State| findings.iter().filter(|f| f.state == state).count();

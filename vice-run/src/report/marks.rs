@@ -74,15 +74,20 @@ impl Marks {
         super::numbers::mean(&errors)
     }
 
+    /// Places of the carriers that a page is about: the estimates, or the reference where there is none.
+    pub(crate) fn shown(&self) -> Vec<usize> {
+        let estimates = || self.carriers.iter().enumerate().filter(|(_, c)| c.estimate.is_some());
+        match estimates().count() {
+            0 => (0..self.carriers.len()).collect(),
+            _ => estimates().map(|(i, _)| i).collect(),
+        }
+    }
+
     /// Stamps in the order in which they are worth a look: the frame that is furthest off, the first, the last, then
     /// ever finer between them.
     pub(crate) fn by_interest(&self) -> Vec<Stamp> {
         let stamps: Vec<Stamp> = self.frames.keys().copied().collect();
-        let estimates = || self.carriers.iter().enumerate().filter(|(_, c)| c.estimate.is_some());
-        let shown: Vec<usize> = match estimates().count() {
-            0 => (0..self.carriers.len()).collect(),
-            _ => estimates().map(|(i, _)| i).collect(),
-        };
+        let shown = self.shown();
         let error = |stamp: &Stamp| {
             let errors: Vec<f64> = shown.iter().filter_map(|c| self.mean_error_px(*stamp, *c)).collect();
             super::numbers::mean(&errors).unwrap_or(-1.0)

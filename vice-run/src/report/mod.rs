@@ -1,6 +1,9 @@
 //! Documents as text and pictures: the paper's table, CSV, LaTeX, plots, frames, and the page.
 
+pub(crate) mod answer;
+pub mod assessment;
 pub mod comparison;
+pub(crate) mod crops;
 pub mod csv;
 pub(crate) mod depth_picture;
 pub mod diagnosis_text;
@@ -12,8 +15,10 @@ pub(crate) mod font;
 pub mod frames;
 pub(crate) mod held;
 pub mod html;
+pub(crate) mod keys;
 pub mod latex;
 pub(crate) mod marks;
+pub(crate) mod moments;
 pub(crate) mod npy;
 pub(crate) mod numbers;
 pub(crate) mod overlay;

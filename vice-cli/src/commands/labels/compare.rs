@@ -15,7 +15,7 @@ use crate::terminal::{self, Outcome};
 #[command(after_help = "Examples:\n  vice labels compare mine.json yours.json\n  \
     vice labels compare mine.json auto.json --json noise.json --plot noise.svg\n  \
     vice evaluate my_run --labels mine.json --estimate odom --label-noise noise.json\n\n\
-    Points are the same by their names; where no name is in both, by where they are (within 5 px, the median over three\n\
+    Points are the same by their names; where no name is in both, by where they are (within 5 px, the median over three \
     frames or more). What is left between two is the floor under RMSE_2D.")]
 pub(crate) struct Args {
     /// Labels: CSV, JSON (vice.labels/1), CVAT for video 1.1 or the authors' pickle.

@@ -21,8 +21,8 @@ use crate::terminal::{self, Outcome, usage};
     vice labels convert labels.csv labels.parquet\n  \
     vice labels convert cotracker.npz labels.json --dataset V1_01_easy --fps 10 --tool CoTracker3\n  \
     vice labels convert tapir.npz labels.json --dataset V1_01_easy --from-corner --size 256x256 --tool TAPIR\n\n\
-    Parquet and JSON keep everything, CSV and CVAT all but what a tracker says of its work. The pickle and CVAT count frames;\n\
-    the data set says which stamps they have. Tracks are arrays (frames, points, 2) in an .npy, or in an .npz as `tracks` with\n\
+    Parquet and JSON keep everything, CSV and CVAT all but what a tracker says of its work. The pickle and CVAT count frames; \
+    the data set says which stamps they have. Tracks are arrays (frames, points, 2) in an .npy, or in an .npz as `tracks` with \
     `visibility`; --start, --duration and --fps say which frames were tracked.")]
 pub(crate) struct Args {
     /// Labels to read: CSV, JSON (vice.labels/1), Parquet, CVAT for video 1.1, the authors' pickle, or tracks as .npy or .npz.

@@ -19,7 +19,7 @@ use crate::terminal::{self, Outcome, Verbosity, printable, with_progress};
     vice labels detect V1_01_easy --apriltag 36h11 --out tags.json\n  \
     vice labels detect my_run --chessboard 6x7 --fps 10 --out board.json\n  \
     vice evaluate my_run --labels tags.json --estimate odometry.txt --reference none --depth tag --tag-size 0.088\n\n\
-    Points are called tag12.c0 (top left corner of the printed tag, then clockwise) and board.r0c0 (row and column of\n\
+    Points are called tag12.c0 (top left corner of the printed tag, then clockwise) and board.r0c0 (row and column of \
     the inner corner). What a human labelled is never changed.")]
 pub(crate) struct Args {
     #[command(flatten)]

@@ -10,13 +10,13 @@ use crate::terminal::{Outcome, Verbosity};
 /// What to do with labels.
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Command {
-    /// How far two sets of labels lie apart: the floor under RMSE_2D.
+    /// Measure how far two sets of labels of the same points differ: no RMSE_2D below that means anything.
     Compare(compare::Args),
     /// Convert labels between CSV, JSON, Parquet and CVAT's XML, or from the authors' pickle.
     Convert(convert::Args),
-    /// Label the corners of AprilTags and chessboards by themselves.
+    /// Detect the corners of AprilTags and chessboards as labels.
     Detect(detect::Args),
-    /// Choose points and follow them through the frames, without a hand.
+    /// Choose points and track them through the frames automatically.
     Track(Box<track::Args>),
 }
 

@@ -17,8 +17,8 @@ use crate::terminal::{self, Outcome, Verbosity, printable, with_progress};
     vice labels track V1_01_easy --fps 10 --start 5 --duration 30 --out auto.json\n  \
     vice labels track my_run --points 4 --depth floor --out auto.json\n  \
     vice labels track my_run --from mine.json --out more.json   (goes on from a person's labels)\n\n\
-    Points are chosen, followed there and back, and held against each other: they have to move as one rigid scene does.\n\
-    No estimate is asked. A reference only tells where the floor or the scan is, so that labels start where depth is known.\n\
+    Points are chosen, followed there and back, and held against each other: they have to move as one rigid scene does. \
+    No estimate is asked. A reference only tells where the floor or the scan is, so that labels start where depth is known. \
     What moves by itself cannot be told from a wrong pose by few points: 40 outvote it, 4 are fewer than that."
 )]
 pub(crate) struct Args {

@@ -17,11 +17,9 @@ use crate::terminal::{self, Outcome, printable, usage};
 
 /// Arguments of `vice plugin check`.
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Example: vice plugin check libvice_adapter_myrobot.so my_recording --json report.json\n\n\
-    `good` is as it should be, `missing` is allowed and says what will not work without it, `suspicious` is allowed but\n\
-    looks like a mistake, FAULT breaks the contract. The exit code is 1 where there is a fault."
-)]
+#[command(after_help = "Example: vice plugin check libvice_adapter_myrobot.so my_recording --json report.json\n\n\
+    `good` is as it should be, `missing` is allowed and says what will not work without it, `suspicious` is allowed but \
+    looks like a mistake, FAULT breaks the contract. The exit code is 1 where there is a fault.")]
 pub(crate) struct Args {
     /// The plugin, a shared library.
     #[arg(value_name = "FILE")]

@@ -1,6 +1,8 @@
 //! The report: one self-contained page that renders result documents.
 
+mod answers;
 pub(crate) mod escape;
+mod moments;
 mod overlay;
 mod page;
 mod settings;
@@ -11,12 +13,15 @@ use crate::error::RunResult;
 use crate::request::labels_shown;
 use crate::result::ResultDocument;
 use maud::{Markup, html};
-use vice_core::result::{PixelPart, Role};
+use vice_core::result::Role;
 
+use super::assessment::Assessment;
 use super::frames::Shots;
+use super::keys::{Key, keys};
 use super::marks::Marks;
-use super::numbers::{px, time_zero};
-use super::plots::{estimate_class, from_above};
+use super::numbers::time_zero;
+use super::plots::timeline::Timeline;
+use super::plots::{all_streams, coordinates, depth_difference, from_above};
 use crate::text::printable;
 
 /// Bytes of JPEG that all runs of a page share; as base64 they take a third more.
@@ -30,22 +35,16 @@ pub struct Run {
     pub document: ResultDocument,
     /// Its pictures.
     pub shots: Shots,
-    /// Sections that others have to add, already rendered.
-    pub more: Vec<Section>,
-}
-
-/// A section of text lines that another command found, such as a diagnosis.
-pub struct Section {
-    /// Its heading.
-    pub title: String,
-    /// A line each.
-    pub lines: Vec<String>,
+    /// What a diagnosis and the checks say of it.
+    pub assessment: Assessment,
+    /// When and where the page was made, if it is to say so: without, the same input makes the same bytes.
+    pub stamp: Option<String>,
 }
 
 impl Run {
-    /// A run whose images are still to be added.
-    pub fn new(document: ResultDocument, shots: Shots) -> Self {
-        Self { name: printable(&document.dataset.name), document, shots, more: vec![] }
+    /// A run with what was found out about it.
+    pub fn new(document: ResultDocument, shots: Shots, assessment: Assessment) -> Self {
+        Self { name: printable(&document.dataset.name), document, shots, assessment, stamp: None }
     }
 }
 
@@ -77,43 +76,52 @@ pub(crate) fn page_with(title: &str, content: &Markup, script: &str) -> String {
 
 fn section(run: &Run, place: usize, alone: bool) -> Markup {
     let document = &run.document;
+    let keys = keys(document);
     let marks = Marks::of(document, None);
-    let d = &document.dataset;
+    let timeline = Timeline::of(document);
+    let zero = time_zero(document);
+    let under = format!("under{place}");
+    let shown = middle_frame(&run.shots);
+    let plots = |plots: Vec<super::plots::Plot>| html! { div.plots { @for plot in &plots { (stream::figure(plot)) } } };
     html! {
-        section id={ "run" (place) } {
+        section.run id={ "run" (place) } {
             @if alone { h1 { (run.name) } } @else { h2 { (run.name) } }
-            p.soft {
-                (printable(&d.format)) ", camera " (printable(&d.camera)) ", "
-                @match labels_shown(&document.request.labels.file) {
-                    Some(labels) => { "labels: " (labels) }
-                    None => {
-                        (document.used.points.len()) " points labelled in "
-                        (printable(&document.request.labels.file.display().to_string()))
-                    }
-                }
-            }
-            p { (summary(document)) }
-            @if let Some(tracking) = &document.used.tracking {
-                @for line in tracking.text().lines() { p.soft { (line) } }
-            }
-            (cards(document))
+            (facts(run))
+            (answers::answers(document, &keys, &run.assessment))
+            (switches(&keys))
             h2 { "The table" }
             (tables::paper(document))
             (tables::scored(document))
             (tables::held_labels(document))
             (tables::doubts(document))
+            h2 { "Over time" }
+            (plots(
+                all_streams::all_streams(document, &keys, &timeline)
+                    .into_iter()
+                    .chain(coordinates::coordinates(document, &keys, &timeline))
+                    .chain(from_above::from_above(document, &keys))
+                    .collect()
+            ))
             h2 { "On the images" }
-            (overlay::strip(&format!("run{place}"), marks.as_ref(), &run.shots, time_zero(document)))
-            @for more in &run.more {
-                h2 { (printable(&more.title)) }
-                @for line in &more.lines { p { (printable(line)) } }
+            (overlay::strip(marks.as_ref(), &keys, &run.shots, zero))
+            @if let Some(marks) = &marks {
+                (moments::moments(marks, &keys, &run.shots, zero))
+                (moments::pieces(marks, &keys, &run.shots, zero))
             }
-            @if let Some(plot) = from_above::from_above(document) {
-                h2 { "Where it went" }
-                div.plots { (stream::figure(&plot)) }
+            @let depths = depth_difference::depth_differences(document, &keys, &timeline);
+            @if !depths.is_empty() {
+                h2 { "Depth" }
+                (plots(depths))
             }
             h2 { "Each stream" }
-            (stream::streams(document))
+            @if let Some((_, shot)) = shown {
+                svg.hold aria-hidden="true" {
+                    symbol id=(under) viewBox={ "0 0 " (shot.size_px[0]) " " (shot.size_px[1]) } preserveAspectRatio="none" {
+                        image width=(shot.size_px[0]) height=(shot.size_px[1]) preserveAspectRatio="none" href=(overlay::data_uri(shot)) {}
+                    }
+                }
+            }
+            (stream::streams(document, &keys, &timeline, shown.map(|_| under.as_str())))
             h2 { "What was left out" }
             (tables::skips(document))
             h2 { "To repeat it" }
@@ -122,63 +130,49 @@ fn section(run: &Run, place: usize, alone: bool) -> Markup {
     }
 }
 
-/// The first thing to know, in a sentence.
-fn summary(document: &ResultDocument) -> String {
-    let scored = |p: &&PixelPart| p.pooled_rmse_px.is_some();
-    let Some(depth) = document.pixel.first().map(|p| p.depth.as_str()) else {
-        return "Nothing was evaluated.".to_string();
-    };
-    let of = |role| document.pixel.iter().filter(scored).filter(move |p| p.role == role && p.depth == depth);
-    let error = |p: &PixelPart| p.pooled_rmse_px.map(px).unwrap_or_default();
-    let mut estimates: Vec<&PixelPart> = of(Role::Estimate).collect();
-    estimates.sort_by(|a, b| {
-        a.pooled_rmse_px.unwrap_or_default().total_cmp(&b.pooled_rmse_px.unwrap_or_default())
-    });
-    let list: Vec<String> =
-        estimates.iter().map(|p| format!("{} {}", printable(&p.stream), error(p))).collect();
-    let mut text = match estimates.as_slice() {
-        [] => "No estimate could be scored".to_string(),
-        [one] => format!("{} is off by {} RMSE_2D", printable(&one.stream), error(one)),
-        _ => format!("RMSE_2D of the estimates: {}", list.join(", ")),
-    };
-    if let Some(reference) = of(Role::Reference).next() {
-        text.push_str(&format!("; the reference, {}: {}", printable(&reference.stream), error(reference)));
-    }
-    text.push_str(&format!(" (all points, depth from {}).", printable(depth)));
-    text
+/// A frame from the middle of the flight, to draw on.
+fn middle_frame(shots: &Shots) -> Option<(&vice_core::time::Stamp, &super::frames::Shot)> {
+    shots.frames.iter().nth(shots.frames.len() / 2)
 }
 
-/// A number for each stream, with the first depth source.
-fn cards(document: &ResultDocument) -> Markup {
-    let depth = document.pixel.first().map(|p| p.depth.as_str());
-    let parts: Vec<&PixelPart> = document.pixel.iter().filter(|p| Some(p.depth.as_str()) == depth).collect();
-    let mut estimates = 0;
-    let cards: Vec<(&PixelPart, &str)> = parts
-        .into_iter()
-        .map(|part| match part.role {
-            Role::Reference => (part, "ref"),
-            Role::Estimate => {
-                estimates += 1;
-                (part, estimate_class(estimates - 1))
-            }
-        })
-        .collect();
+/// What the page is about and how it was made, in a few lines.
+fn facts(run: &Run) -> Markup {
+    let document = &run.document;
+    let d = &document.dataset;
     html! {
-        div.cards {
-            @for (part, class) in cards {
-                div class={ "card k-" (class) } {
-                    div { (printable(&part.stream)) @if part.role == Role::Reference { " (reference)" } }
-                    b { (part.pooled_rmse_px.map_or_else(|| "–".to_string(), px)) }
-                    div.soft {
-                        @if let Some([low, high]) = part.interval_95 { "95 %: " (px(low)) " to " (px(high)) br; }
-                        (part.scored) " labels scored"
-                        @if !part.skipped.is_empty() { ", " (part.skipped.len()) " skipped" }
-                        @if let Some(t) = document.trajectory.iter().find(|t| part.role == Role::Estimate && t.estimate == part.stream) {
-                            @if let Some(m) = t.rmse_3d_m { br; "RMSE_3D " (format!("{m:.3}")) " m" }
-                            @if let Some(rad) = t.aoe_rad { ", AOE " (format!("{rad:.3}")) " rad" }
-                        }
-                    }
+        p.soft {
+            (printable(&d.format)) ", camera " (printable(&d.camera)) ", "
+            @match labels_shown(&document.request.labels.file) {
+                Some(labels) => { "labels: " (labels) }
+                None => {
+                    (document.used.points.len()) " points labelled in "
+                    (printable(&document.request.labels.file.display().to_string()))
                 }
+            }
+            ". VICE " (printable(&document.vice_version))
+            @if let Some(stamp) = &run.stamp { ", " (printable(stamp)) }
+        }
+        @if let Some(tracking) = &document.used.tracking {
+            @for line in tracking.text().lines() { p.soft { (line) } }
+        }
+        @if let Some(command) = settings::command(document) { pre.asked { (printable(&command)) } }
+    }
+}
+
+/// The streams with their colours, to be switched off where scripts run; else the key of all plots.
+fn switches(keys: &[Key]) -> Markup {
+    html! {
+        div.switches role="group" aria-label="streams" {
+            span data-switch="label" { span.key.k-label {} "label" }
+            @for key in keys {
+                span data-switch=(key.id) {
+                    span class={ "key k-" (key.class) } {}
+                    (key.name)
+                    @if key.role == Role::Reference { " (reference)" }
+                }
+            }
+            span.hint hidden {
+                "Keys: 1 to 9 streams, ← → frames, space plays, + − zoom, 0 all. Drag over a plot to zoom in time, double-click to go back."
             }
         }
     }

@@ -8,11 +8,11 @@ use sha2::{Digest, Sha256};
 use crate::report::plots::picture;
 
 const STYLE: &str = include_str!("style.css");
-const SLIDER: &str = include_str!("slider.js");
+const SCRIPT: &str = concat!(include_str!("frames.js"), include_str!("plots.js"));
 
 /// A whole page. `data` is JSON for machines, already made safe for a script element.
 pub(crate) fn page(title: &str, content: &Markup, data: &[String]) -> String {
-    page_with(title, content, data, SLIDER)
+    page_with(title, content, data, SCRIPT)
 }
 
 /// A whole page with the one script that may run in it.
@@ -69,7 +69,7 @@ mod tests {
         assert_eq!(text.matches("<script").count(), 2);
         // The hash of an empty text, as everyone knows it.
         assert_eq!(hash(""), "sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU=");
-        for inline in [STYLE, picture::CSS, SLIDER] {
+        for inline in [STYLE, picture::CSS, SCRIPT] {
             assert!(!inline.contains("</") && !inline.contains("url("));
         }
     }

@@ -53,7 +53,7 @@ fn text(value: &Value) -> String {
 }
 
 /// The command line that evaluates the same again; `None` where recording, labels or poses were never files.
-fn command(document: &ResultDocument) -> Option<String> {
+pub(crate) fn command(document: &ResultDocument) -> Option<String> {
     let named = !document.request.dataset.path.as_os_str().is_empty();
     (named && document.request.has_command_line()).then(|| document.request.command_line())
 }

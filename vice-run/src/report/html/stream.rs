@@ -1,68 +1,53 @@
-//! What there is to see of one stream with one depth source.
+//! The part of the page about each stream.
 
-use crate::result::ResultDocument;
 use maud::{Markup, PreEscaped, html};
 use vice_core::result::{PixelPart, Role};
 
-use crate::report::numbers::time_zero;
-use crate::report::plots::{Plot, correlation, estimate_class, over_time, spread, vectors};
+use crate::report::keys::Key;
+use crate::report::plots::timeline::Timeline;
+use crate::report::plots::{Plot, correlation, over_time, spread, vectors};
+use crate::result::ResultDocument;
 use crate::text::printable;
 
-/// Sections of all streams; the first depth source open, the others to be opened.
-pub(crate) fn streams(document: &ResultDocument) -> Markup {
-    let mut names: Vec<(&str, Role)> = Vec::new();
-    for part in &document.pixel {
-        if !names.contains(&(part.stream.as_str(), part.role)) {
-            names.push((&part.stream, part.role));
-        }
-    }
+/// Sections of all streams, with the first depth source that they have. `under` names a picture for the error vectors.
+pub(crate) fn streams(
+    document: &ResultDocument,
+    keys: &[Key],
+    timeline: &Timeline,
+    under: Option<&str>,
+) -> Markup {
     html! {
-        @for (name, role) in &names {
-            @let parts: Vec<&PixelPart> =
-                document.pixel.iter().filter(|p| p.stream == *name && p.role == *role).collect();
-            @let class = class(&names, name, *role);
-            h3 {
-                span class={ "key k-" (class) } {}
-                (printable(name))
-                @if *role == Role::Reference { " (reference)" }
-            }
-            @for (place, part) in parts.iter().enumerate() {
-                @if place == 0 {
-                    p.soft { "depth from " (printable(&part.depth)) }
-                    (plots(document, part, class))
-                } @else {
-                    details {
-                        summary { "with depth from " (printable(&part.depth)) }
-                        (plots(document, part, class))
-                    }
+        @for key in keys {
+            @if let Some(part) = document.pixel.iter().find(|p| p.stream == key.stream && p.role == key.role) {
+                h3 {
+                    span class={ "key k-" (key.class) } {}
+                    (key.name)
+                    @if key.role == Role::Reference { " (reference)" }
                 }
+                p.soft { "depth from " (printable(&part.depth)) }
+                (plots(document, part, key, timeline, under))
             }
         }
     }
 }
 
-/// The colour of a stream: its place among the estimates.
-pub(crate) fn class(names: &[(&str, Role)], name: &str, role: Role) -> &'static str {
-    match role {
-        Role::Reference => "ref",
-        Role::Estimate => {
-            let mut estimates = names.iter().filter(|n| n.1 == Role::Estimate);
-            estimate_class(estimates.position(|n| n.0 == name).unwrap_or(0))
-        }
-    }
-}
-
-fn plots(document: &ResultDocument, part: &PixelPart, class: &str) -> Markup {
+fn plots(
+    document: &ResultDocument,
+    part: &PixelPart,
+    key: &Key,
+    timeline: &Timeline,
+    under: Option<&str>,
+) -> Markup {
     let trajectory = document
         .trajectory
         .iter()
         .find(|t| part.role == Role::Estimate && t.estimate == part.stream && !t.frames.is_empty());
     let plots = [
-        over_time::over_time(part, trajectory, time_zero(document), class),
-        trajectory.and_then(|t| correlation::against_truth(part, t, class)),
-        vectors::vectors(part, document.dataset.image_size_px, class),
-        spread::histogram(part, class),
-        spread::per_point(part, class),
+        over_time::over_time(part, trajectory, timeline, key),
+        trajectory.and_then(|t| correlation::against_truth(part, t, key.class)),
+        vectors::vectors(part, document.dataset.image_size_px, key.class, under),
+        spread::histogram(part, key.class),
+        spread::per_point(part, key.class),
     ];
     let plots: Vec<Plot> = plots.into_iter().flatten().collect();
     html! {

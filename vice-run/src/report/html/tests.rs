@@ -1,16 +1,26 @@
 use super::*;
+use crate::report::assessment::Diagnosed;
 use crate::report::testing::{HOSTILE, document, hostile_document, part, sample};
+use vice_core::check::{Finding, State};
 
 fn page(document: ResultDocument) -> String {
-    render(&[Run::new(document, Shots::missing(HOSTILE))]).unwrap()
+    render(&[Run::new(document, Shots::missing(HOSTILE), Assessment::not_run("nobody asked"))]).unwrap()
 }
 
 #[test]
 fn no_text_from_data_becomes_markup() {
-    let mut run = Run::new(hostile_document(), Shots::missing(HOSTILE));
-    run.more.push(Section { title: HOSTILE.to_string(), lines: vec![HOSTILE.to_string()] });
+    let mut assessment = Assessment::not_run(HOSTILE);
+    assessment.diagnoses.push(Diagnosed {
+        stream: HOSTILE.to_string(),
+        depth: HOSTILE.to_string(),
+        outcome: Err(HOSTILE.to_string()),
+    });
+    let finding = Finding::new("clock", HOSTILE, State::Wrong, HOSTILE).mend(HOSTILE);
+    assessment.findings = Some(vec![finding]);
+    let mut run = Run::new(hostile_document(), Shots::missing(HOSTILE), assessment);
+    run.stamp = Some(HOSTILE.to_string());
     let text = render(&[run]).unwrap();
-    // Ours: the data, and the slider.
+    // Ours: the data, and what makes the page move.
     assert_eq!(text.matches("<script").count(), 2);
     assert_eq!(text.matches("</script").count(), 2);
     assert!(text.contains("&lt;script&gt;alert(1)"));
@@ -25,6 +35,11 @@ fn no_text_from_data_becomes_markup() {
 fn what_is_missing_is_said() {
     let text = page(document(vec![part("e", &[])]));
     assert!(text.contains("No images to draw on") && text.contains("No label could be scored"));
+    assert!(
+        text.contains("Can e be trusted?")
+            && text.contains("Not known")
+            && !text.contains("as far as these labels")
+    );
     let mut without_samples = part("e", &[sample("a", 1, 2.0)]);
     without_samples.samples.clear();
     assert!(page(document(vec![without_samples])).contains("--samples none"));

@@ -49,6 +49,11 @@ impl Axis {
         if place.is_finite() { place.clamp(0.0, 1.0) } else { 0.0 }
     }
 
+    /// Its ends.
+    pub(crate) const fn ends(&self) -> [f64; 2] {
+        [self.low, self.high]
+    }
+
     /// Length of the range.
     pub(crate) fn span(&self) -> f64 {
         self.high - self.low

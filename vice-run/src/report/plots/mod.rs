@@ -3,13 +3,17 @@
 //! The writer is our own and small. A plotting crate sets colours and fonts as attributes of every element, so that a
 //! page in dark mode or on paper cannot change them, rounds to whole pixels, and takes an element for each dot.
 
+pub(crate) mod all_streams;
 pub(crate) mod axis;
+pub(crate) mod coordinates;
 pub(crate) mod correlation;
+pub(crate) mod depth_difference;
 pub(crate) mod from_above;
 pub(crate) mod over_time;
 pub(crate) mod panel;
 pub(crate) mod picture;
 pub(crate) mod spread;
+pub(crate) mod timeline;
 pub(crate) mod trajectory;
 pub(crate) mod vectors;
 
@@ -24,7 +28,7 @@ pub(crate) struct Plot {
 /// Width of a plot in its own units: narrow enough that its letters can be read on a phone.
 pub(crate) const WIDTH: f64 = 480.0;
 /// Space for the numbers of the y axis.
-pub(crate) const LEFT: f64 = 54.0;
+pub(crate) const LEFT: f64 = 64.0;
 /// Space on the right.
 pub(crate) const RIGHT: f64 = 20.0;
 /// Dots in a plot.

@@ -30,6 +30,7 @@ impl Panel {
                 picture.text("", (self.left - 6.0, y + 4.0), Anchor::End, &label);
             }
         }
+        picture.begin_marks();
         for (value, label) in self.x.ticks() {
             let x = self.place_x(value);
             picture.line("grid", [(x, self.top), (x, bottom)]);
@@ -37,9 +38,10 @@ impl Panel {
                 picture.text("", (x, bottom + 15.0), Anchor::Middle, &label);
             }
         }
+        picture.end();
         picture.line("axis", [(self.left, bottom), (right, bottom)]);
         if let Some(title) = y_title {
-            picture.text("title", (self.left - 34.0, self.top - 8.0), Anchor::Start, title);
+            picture.text("title", (self.left - 34.0, self.top - 12.0), Anchor::Start, title);
         }
         if let Some(title) = x_title {
             picture.text("", (right, bottom + 31.0), Anchor::End, title);

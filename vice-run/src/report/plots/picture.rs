@@ -4,12 +4,23 @@
 use std::fmt::Write;
 
 use crate::report::html::escape::push_escaped;
+use crate::report::keys::Key;
 
 /// The classes, for pages and for files of their own.
 pub(crate) const CSS: &str = include_str!("plot.css");
 
 /// A place in the picture, in its own units from the top left.
 pub(crate) type Place = (f64, f64);
+
+/// What the edges of a panel are worth.
+pub(crate) struct Edges<'a> {
+    /// Left and right, seconds.
+    pub(crate) x: [f64; 2],
+    /// Bottom and top.
+    pub(crate) y: [f64; 2],
+    /// The unit of y.
+    pub(crate) unit: &'a str,
+}
 
 /// Where a text stands against its place.
 #[derive(Clone, Copy, Debug)]
@@ -48,9 +59,9 @@ impl Picture {
     pub(crate) fn line(&mut self, class: &str, places: impl IntoIterator<Item = Place>) {
         let mut places = places.into_iter();
         let Some((x, y)) = places.next() else { return };
-        self.push(format_args!("<path class=\"line {class}\" d=\"M{x:.1} {y:.1}"));
+        self.push(format_args!("<path class=\"line {class}\" d=\"M{x:.1} {y:.2}"));
         for (x, y) in places {
-            self.push(format_args!("L{x:.1} {y:.1}"));
+            self.push(format_args!("L{x:.1} {y:.2}"));
         }
         self.body.push_str("\"/>");
     }
@@ -78,6 +89,45 @@ impl Picture {
         let (width, height) = (width.max(0.0), height.max(0.0));
         self.push(format_args!(
             "<rect class=\"bar {class}\" x=\"{x:.1}\" y=\"{y:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"/>"
+        ));
+    }
+
+    /// What belongs to a pose stream from here to [`Self::end`]: a page can hide it, and tells its name.
+    pub(crate) fn begin_stream(&mut self, key: &Key) {
+        self.push(format_args!("<g data-s=\"{}\" data-name=\"", key.id));
+        push_escaped(&mut self.body, &key.name);
+        self.body.push_str("\">");
+    }
+
+    /// Closes the group that was begun last.
+    pub(crate) fn end(&mut self) {
+        self.body.push_str("</g>");
+    }
+
+    /// A panel from here to [`Self::end_view`] of which a page can show a part: where it lies, and what its edges are worth.
+    pub(crate) fn begin_view(&mut self, (x, y): Place, (width, height): (f64, f64), edges: &Edges<'_>) {
+        let [x0, x1] = edges.x;
+        let [y0, y1] = edges.y;
+        self.push(format_args!(
+            "<svg class=\"view\" x=\"{x:.1}\" y=\"{y:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" viewBox=\"{x:.1} {y:.1} {width:.1} {height:.1}\" preserveAspectRatio=\"none\" data-x0=\"{x0}\" data-x1=\"{x1}\" data-y0=\"{y0}\" data-y1=\"{y1}\" data-unit=\"{}\">",
+            edges.unit
+        ));
+    }
+
+    /// Closes a panel.
+    pub(crate) fn end_view(&mut self) {
+        self.body.push_str("</svg>");
+    }
+
+    /// A group of marks of an axis, which a page draws anew when it shows a part.
+    pub(crate) fn begin_marks(&mut self) {
+        self.body.push_str("<g class=\"xmarks\">");
+    }
+
+    /// A picture that the page holds under this name, stretched over a rectangle.
+    pub(crate) fn under(&mut self, name: &str, (x, y): Place, (width, height): (f64, f64)) {
+        self.push(format_args!(
+            "<use class=\"under\" href=\"#{name}\" x=\"{x:.1}\" y=\"{y:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"/>"
         ));
     }
 

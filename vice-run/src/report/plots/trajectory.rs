@@ -27,6 +27,7 @@ pub(crate) fn file(estimates: &[(&PosePairs, &str)], reference: &str) -> String 
         name: ending(&printable(name)),
         class,
         places_m: poses.iter().map(|p| (p.translation().x, p.translation().y)).collect(),
+        key: None,
     };
     let class = |index: usize| estimate_class(index).to_string();
     // The reference is drawn as far as the first estimate goes.

@@ -22,7 +22,13 @@ struct Pattern {
 }
 
 /// The vectors from each label to where the stream carried the point.
-pub(crate) fn vectors(part: &PixelPart, image_size_px: Option<[u32; 2]>, class: &str) -> Option<Plot> {
+/// `under` names a picture of the page to draw them on.
+pub(crate) fn vectors(
+    part: &PixelPart,
+    image_size_px: Option<[u32; 2]>,
+    class: &str,
+    under: Option<&str>,
+) -> Option<Plot> {
     let finite = |s: &&vice_core::result::Sample| {
         [s.label_px.u, s.label_px.v, s.tracked_px.u, s.tracked_px.v].iter().all(|v| v.abs() < 1e9)
     };
@@ -53,6 +59,9 @@ pub(crate) fn vectors(part: &PixelPart, image_size_px: Option<[u32; 2]>, class: 
     };
     let mut picture = Picture::new(WIDTH, height + 36.0);
     picture.text("title", (12.0, 14.0), super::picture::Anchor::Start, &format!("error vectors × {factor}"));
+    if let Some(name) = under {
+        picture.under(name, (panel.left, panel.top), (width, height));
+    }
     picture.frame("", (panel.left, panel.top), (width, height));
     // Down in the image is down in the picture.
     let place = |[u, v]: [f64; 2]| (panel.place_x(u), panel.top + panel.height * panel.y.place(v));
