@@ -119,6 +119,9 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     let page = match &files.report {
         Some(path) => {
             let shots = shots(&document, opened.dataset.as_ref(), IMAGE_BUDGET_BYTES, verbosity);
+            if let Some(problem) = &shots.problem {
+                tracing::warn!("{}: {problem}", path.display());
+            }
             Some((path, render(&[Run::new(document.clone(), shots)])?))
         }
         None => None,

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::result::ResultDocument;
 use vice_core::dataset::{Dataset, Image};
+use vice_core::error::one_line;
 use vice_core::time::Stamp;
 use vice_files::image_file::{encode_jpeg, shrink};
 
@@ -52,10 +53,11 @@ impl Shots {
         let camera = &document.dataset.camera;
         let frames = match dataset.frames(camera) {
             Ok(frames) => frames,
-            Err(error) => return Self::missing(error.to_string()),
+            Err(error) => return Self::missing(one_line(&error)),
         };
         let wanted: Vec<Stamp> = marks.by_interest().into_iter().take(MAX_FRAMES).collect();
         let mut shots = Self::default();
+        let (mut failed, mut first) = (0, None);
         // In the order of time, in which films are decoded.
         let mut in_time: Vec<Stamp> = wanted.clone();
         in_time.sort_unstable();
@@ -73,10 +75,14 @@ impl Shots {
                     shots.frames.insert(*stamp, shot);
                 }
                 Err(error) => {
-                    shots.problem.get_or_insert_with(|| error.to_string());
+                    failed += 1;
+                    first.get_or_insert_with(|| one_line(&error));
                 }
             }
         }
+        shots.problem = first.map(|why| {
+            format!("{failed} of {} pictures cannot be shown, the first because: {why}", in_time.len())
+        });
         shots.keep_within(&wanted, budget_bytes);
         shots
     }

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use rayon::prelude::*;
+use vice_core::budget::Budget;
 use vice_core::error::{DataError, DataResult};
 
 use super::bytes::Bytes;
@@ -13,11 +14,18 @@ use super::{Locator, Payload, Scan, Visitor};
 
 /// Bytes beyond which a block is refused: recorders write blocks of about a megabyte, or of one message.
 const MAX_BLOCK_BYTES: u64 = 1 << 30;
-/// Bytes from which on a block must not unpack to more than [`MOST_TIMES`] its size: no robot sees that much of nothing.
-const LARGE_BYTES: u64 = 16 << 20;
-const MOST_TIMES: u64 = 1000;
-/// Bytes reserved on the word of a header, before any data is seen.
-const TRUSTED_BYTES: u64 = 64 << 20;
+/// Bytes that any block may unpack to, however small it is.
+const FREE_BYTES: u64 = 64 << 20;
+/// How many times its size a larger one may unpack to: no robot sees that much of nothing.
+const MOST_TIMES: u64 = 64;
+/// Bytes that the blocks of any file may unpack to together, and how many times its size those of a larger one may.
+const FREE_FILE_BYTES: u64 = 256 << 20;
+const MOST_TIMES_OF_FILE: u64 = 256;
+/// Bytes that are unpacked at once by several threads, beside the first block of them.
+const BATCH_BYTES: u64 = 64 << 20;
+/// Bytes reserved on the word of a header, before any data is seen: so many, or so many times those that are stored.
+const TRUSTED_BYTES: u64 = 1 << 20;
+const TRUSTED_TIMES: u64 = 32;
 /// Blocks kept: a step forward needs those of the colour and the depth image, and their successors.
 const CACHED_BLOCKS: usize = 4;
 /// Bytes kept, beside the newest block.
@@ -93,18 +101,20 @@ pub(super) fn decompress(
     out: &mut Vec<u8>,
 ) -> Option<String> {
     out.clear();
-    if size > MAX_BLOCK_BYTES {
-        return Some(format!("claims {size} bytes, more than {MAX_BLOCK_BYTES} is not read"));
+    let packed = stored.len() as u64;
+    if let Some(problem) = over_budget(size, packed) {
+        return Some(problem);
     }
+    let trusted = TRUSTED_BYTES.max(packed.saturating_mul(TRUSTED_TIMES)).min(FREE_BYTES);
     if compression != Compression::None {
-        out.reserve_exact(size.min(TRUSTED_BYTES) as usize);
+        out.reserve_exact(size.min(trusted) as usize);
     }
     let done = match compression {
         Compression::None => {
             *out = stored;
             Ok(0)
         }
-        Compression::Zstd if !salvage && size <= TRUSTED_BYTES => {
+        Compression::Zstd if !salvage && size <= trusted => {
             // The buffer may be larger than this block: what does not fit its header is refused below.
             zstd::bulk::Decompressor::new().and_then(|mut d| d.decompress_to_buffer(&stored, out))
         }
@@ -120,6 +130,15 @@ pub(super) fn decompress(
         Ok(_) if out.len() as u64 != size => Some(format!("has {} bytes, its header says {size}", out.len())),
         Ok(_) => None,
     }
+}
+
+/// Why a block of so many bytes is not unpacked to as many as its header says.
+fn over_budget(size: u64, stored: u64) -> Option<String> {
+    let usual = FREE_BYTES.max(stored.saturating_mul(MOST_TIMES)).min(MAX_BLOCK_BYTES);
+    let most = Budget::in_use().most(usual);
+    let raised = Budget::raised(size.max(stored), usual);
+    (size.max(stored) > most)
+        .then(|| format!("claims {size} bytes in {stored}, more than the budget of {most} ({raised})"))
 }
 
 /// Random access to bytes of a file or of memory.
@@ -245,12 +264,8 @@ impl BlockFile {
     /// Reads and decompresses a block into `out`; gives why where that is not everything.
     fn load(&self, block: &Block, out: &mut Vec<u8>) -> Option<String> {
         out.clear();
-        if block.stored > MAX_BLOCK_BYTES {
-            return Some(format!("has {} bytes, too many to be read", block.stored));
-        }
-        if block.size > LARGE_BYTES && block.size / block.stored.max(1) > MOST_TIMES {
-            let (size, stored) = (block.size, block.stored);
-            return Some(format!("claims {size} bytes in {stored}, more than {MOST_TIMES} times as many"));
+        if let Some(problem) = over_budget(block.size, block.stored) {
+            return Some(problem);
         }
         let stored = match self.read_vec(block.offset, block.stored) {
             Ok(stored) => stored,
@@ -364,6 +379,7 @@ impl BlockFile {
         let mut state = State::default();
         let mut buffers = vec![Vec::new(); rayon::current_num_threads().min(16)];
         let (mut at, mut ahead) = (0, 0);
+        let mut unpacked = Unpacked::of(self.len());
         while at < blocks.len() {
             self.bytes.all_had()?;
             if at >= ahead {
@@ -386,7 +402,16 @@ impl BlockFile {
             let more = blocks[at + 1..ahead]
                 .iter()
                 .take_while(|b| !b.is_plain() && !self.only_counts(b, &state, scan));
+            let mut together = 0;
+            let more = more.take_while(|b| {
+                together += b.size;
+                together <= BATCH_BYTES
+            });
             let batch: Vec<&Block> = [&blocks[at]].into_iter().chain(more).take(buffers.len()).collect();
+            if let Err(error) = batch.iter().try_for_each(|block| unpacked.add(block)) {
+                scan.damaged(&error.at(path).byte(blocks[at].offset));
+                break;
+            }
             let each = batch.par_iter().zip(&mut buffers);
             let problems: Vec<_> = each.map(|(block, buffer)| self.load(block, buffer)).collect();
             for ((block, bytes), problem) in batch.into_iter().zip(&buffers).zip(problems) {
@@ -412,6 +437,28 @@ impl BlockFile {
             scan.damaged(&DataError::new(problem).at(path));
         }
         self.bytes.all_had()
+    }
+}
+
+/// What the blocks of a file unpack to: each may be small enough and all of them together too much.
+struct Unpacked {
+    bytes: u64,
+    usual: u64,
+}
+
+impl Unpacked {
+    fn of(file_bytes: u64) -> Self {
+        Self { bytes: 0, usual: FREE_FILE_BYTES.max(file_bytes.saturating_mul(MOST_TIMES_OF_FILE)) }
+    }
+
+    fn add(&mut self, block: &Block) -> DataResult<()> {
+        if block.compression == Compression::None {
+            return Ok(());
+        }
+        self.bytes = self.bytes.saturating_add(block.size.min(MAX_BLOCK_BYTES));
+        Budget::in_use().check(self.bytes, "bytes", self.usual).map_err(|e| {
+            DataError::new(format!("the chunks up to here unpack to too much, the rest is left out: {e}"))
+        })
     }
 }
 

@@ -12,7 +12,7 @@ use rusqlite::{Connection, OpenFlags};
 use vice_core::error::{DataError, DataResult};
 use vice_core::time::Stamp;
 
-use super::unpack::log_of;
+use super::unpack::{log_of, most_of_message, too_much};
 use super::{Container, HEAD_BYTES, Locator, MAX_MESSAGE_BYTES, Message, Payload, Scan, Visitor, Want};
 
 /// What a data base starts with.
@@ -105,9 +105,13 @@ impl Db3 {
             blob.read_exact(&mut bytes).map_err(read)?;
             return Ok(bytes);
         }
-        let limit = if head { HEAD_BYTES as u64 } else { MAX_MESSAGE_BYTES };
+        let most = most_of_message(size);
+        let limit = if head { HEAD_BYTES as u64 } else { MAX_MESSAGE_BYTES.min(most + 1) };
         let decoder = zstd::stream::read::Decoder::new(blob).map_err(read)?;
         decoder.take(limit).read_to_end(&mut bytes).map_err(read)?;
+        if bytes.len() as u64 > most {
+            return Err(DataError::new(format!("message {row}: {}", too_much(size))));
+        }
         Ok(bytes)
     }
 
