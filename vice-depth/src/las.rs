@@ -18,6 +18,7 @@ const PIECE_POINTS: u64 = 1 << 16;
 /// Reads the points of a file that is `length` bytes long.
 pub(crate) fn read_points(mut file: File, length: Option<u64>, sink: &mut impl PointSink) -> DataResult<()> {
     if let Some(length) = length {
+        check_records(&mut file, length)?;
         check_chunks(&mut file, length)?;
     }
     let mut reader = checked("the header", || Reader::new(BufReader::new(file)))?;
@@ -46,6 +47,40 @@ pub(crate) fn read_points(mut file: File, length: Option<u64>, sink: &mut impl P
             sink.double([x, y, z])?;
         }
         found += got;
+    }
+    Ok(())
+}
+
+/// Holds the numbers of points and records that a header announces against the length of the file: the decoder multiplies
+/// them as they are. What is no header is for the decoder to refuse.
+fn check_records(file: &mut File, length: u64) -> DataResult<()> {
+    /// Bytes of a record's own header, before the points and after them.
+    const RECORD: u64 = 54;
+    const EXTENDED_RECORD: u64 = 60;
+    let mut header = Vec::new();
+    let failed = |e: std::io::Error| DataError::new("cannot be read").because(e);
+    file.by_ref().take(375).read_to_end(&mut header).map_err(failed)?;
+    file.rewind().map_err(failed)?;
+    let bytes = |at: usize, count: usize| {
+        let mut word = [0; 8];
+        word[..count].copy_from_slice(header.get(at..at + count)?);
+        Some(u64::from_le_bytes(word))
+    };
+    let is_compressed = bytes(104, 1).is_none_or(|format| format & 0x80 != 0);
+    let large = bytes(25, 1).is_some_and(|minor| minor >= 4);
+    let size = if is_compressed { 0 } else { bytes(105, 2).unwrap_or(0) };
+    let mut promised = vec![("points", bytes(107, 4), size), ("records", bytes(100, 4), RECORD)];
+    if large {
+        promised.push(("points", bytes(247, 8), size));
+        promised.push(("records after the points", bytes(243, 4), EXTENDED_RECORD));
+    }
+    for (what, count, each) in promised {
+        let count = count.unwrap_or(0);
+        // No laser has measured so many points, whatever they are packed to.
+        if count.saturating_mul(each) > length || count > 1 << 40 {
+            return Err(DataError::new(format!("the header promises {count} {what}, in a file of {length} bytes"))
+                .hint("the file is cut off, or no LAS file"));
+        }
     }
     Ok(())
 }

@@ -18,6 +18,7 @@ mod cases;
 mod check;
 mod check_images;
 mod commands;
+mod dependencies;
 mod depth_oracle;
 mod detect;
 mod detect_rendered;

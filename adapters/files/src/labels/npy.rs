@@ -11,8 +11,8 @@ pub(super) const NPZ: &[u8] = b"PK\x03\x04";
 /// Arrays of more numbers are refused before anything is taken for them.
 const MOST_NUMBERS: u64 = 1 << 28;
 /// Bytes that any archive may unpack to, and how many times its size a larger one may: places of points do not repeat.
-const FREE_BYTES: u64 = 64 << 20;
-const MOST_TIMES: u64 = 64;
+const FREE_BYTES: u64 = 32 << 20;
+const MOST_TIMES: u64 = 8;
 
 /// An array, the last index running fastest.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,7 +29,7 @@ pub(super) struct Array {
 /// [`DataError`] if the bytes are neither, or an array is of a type that is not read.
 pub(super) fn read(bytes: &[u8]) -> DataResult<Vec<(String, Array)>> {
     if bytes.starts_with(NPY) {
-        return Ok(vec![(String::new(), array(bytes)?)]);
+        return Ok(vec![(String::new(), array(bytes, Budget::in_use().most(8 * bytes.len() as u64))?)]);
     }
     let broken = |e: zip::result::ZipError| DataError::new("the archive cannot be read").because(e);
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(broken)?;
@@ -50,8 +50,11 @@ pub(super) fn read(bytes: &[u8]) -> DataResult<Vec<(String, Array)>> {
             DataError::new(format!("the archive unpacks to more than the budget of {} bytes", budget.most(usual)))
                 .hint(format!("where it is right, {}", Budget::raised(claimed, usual)))
         })?;
-        match array(&content) {
-            Ok(array) => arrays.push((name, array)),
+        match array(&content, left) {
+            Ok(array) => {
+                left = left.saturating_sub(8 * array.values.len() as u64);
+                arrays.push((name, array));
+            }
             // Others may stand beside those that are looked for.
             Err(error) if error.kind() == ErrorKind::Unsupported => {}
             Err(error) => return Err(DataError::new(format!("the array `{name}`: {error}"))),
@@ -60,7 +63,8 @@ pub(super) fn read(bytes: &[u8]) -> DataResult<Vec<(String, Array)>> {
     Ok(arrays)
 }
 
-fn array(bytes: &[u8]) -> DataResult<Array> {
+/// The array of some bytes, whose numbers may take so many as doubles.
+fn array(bytes: &[u8], most_bytes: u64) -> DataResult<Array> {
     let broken = || DataError::new("is no array of NumPy, or the file is cut off");
     let version = *bytes.get(6).filter(|_| bytes.starts_with(NPY)).ok_or_else(broken)?;
     let (start, length): (usize, usize) = match version {
@@ -112,6 +116,10 @@ fn array(bytes: &[u8]) -> DataResult<Array> {
         return Err(unsupported());
     }
     let data = data.get(..count * size).ok_or_else(broken)?;
+    if 8 * count as u64 > most_bytes {
+        let hint = format!("where it is right, {}", Budget::raised(8 * count as u64, most_bytes));
+        return Err(DataError::new(format!("its {count} numbers take more than the budget of {most_bytes} bytes")).hint(hint));
+    }
     let values =
         data.chunks_exact(size).map(|b| number(kind, b)).collect::<Option<Vec<f64>>>().ok_or_else(broken)?;
     let values = if fortran { turned(&shape, &values) } else { values };

@@ -222,6 +222,8 @@ pub(super) struct State {
     pub(super) schemas: std::collections::HashMap<u16, String>,
     /// Messages whose connection or channel was never described.
     pub(super) orphans: u64,
+    /// Bytes that messages unpacked to beyond what messages usually do, all together.
+    pub(super) beyond_usual: u64,
 }
 
 type Decompressed = Result<Arc<Vec<u8>>, String>;

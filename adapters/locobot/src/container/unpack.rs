@@ -189,6 +189,16 @@ pub(super) fn most_of_message(stored: u64) -> u64 {
     Budget::in_use().most(usual_of_message(stored))
 }
 
+/// Bytes of messages beyond the usual after which none of a file is unpacked any more.
+pub(super) fn most_beyond_usual() -> u64 {
+    Budget::in_use().most(UNPACKED_BYTES)
+}
+
+/// How much of what a message of so many bytes unpacked to is beyond the usual.
+pub(super) fn beyond_usual(stored: u64, unpacked: u64) -> u64 {
+    unpacked.saturating_sub(stored.saturating_mul(MESSAGE_TIMES))
+}
+
 /// What is said of a message that unpacks to more.
 pub(super) fn too_much(stored: u64) -> String {
     let (most, usual) = (most_of_message(stored), usual_of_message(stored));

@@ -85,8 +85,11 @@ fn resources_of_what_stands_beside_pixels() {
     let bomb = zeros_packed(400_000_000);
     let profile = png_chunk(b"iCCP", &[b"a\0\0", &bomb[..]].concat());
     let note = png_chunk(b"zTXt", &[b"a\0\0", &bomb[..]].concat());
-    of_pictures("a profile", &black_png(752, 480, &profile), &[]);
-    of_pictures("a text", &black_png(752, 480, &note), &[]);
+    for (what, beside) in [("a profile", profile), ("a text", note)] {
+        let flight = Flight::new();
+        flight.write(&format!("run/mav0/cam0/data/{}.png", STAMPS[0]), &black_png(752, 480, &beside));
+        looked_at(what, &flight, &[]);
+    }
 }
 
 #[test]

@@ -79,10 +79,12 @@ impl IsolatedPlugin {
     pub fn load(file: impl AsRef<Path>, options: &LoadOptions) -> DataResult<Self> {
         let file = file.as_ref();
         // Not found is told of the name that the user gave, without a process.
-        let place = crate::place::look(file)?;
-        let (process, hello) = started(&place.path, options)?;
+        crate::place::look(file)?;
+        // As it was named: links on the way to it are looked at where it is loaded.
+        let file = std::path::absolute(file).unwrap_or_else(|_| file.to_path_buf());
+        let (process, hello) = started(&file, options)?;
         let prober = Mutex::new(Some(process));
-        let shared = Shared { file: file.to_path_buf(), options: *options, hello, prober };
+        let shared = Shared { file, options: *options, hello, prober };
         Ok(Self { shared: Arc::new(shared) })
     }
 

@@ -15,7 +15,7 @@ use super::codec::{Carried, Reader, Writer};
 use crate::LoadOptions;
 
 /// Seconds that a call may take.
-const CALL_SECONDS: u64 = 60;
+const CALL_SECONDS: u64 = 30;
 /// Bytes of one answer; the largest are images and clouds.
 const ANSWER_BYTES: u64 = 2 << 30;
 /// Lines, and bytes of each, that a plugin may say to the user.
@@ -153,11 +153,14 @@ fn answers_of(mut pipe: impl Read + Send + 'static) -> Receiver<Vec<u8>> {
                 return;
             }
             let length = u64::from_le_bytes(length);
+            if length > Budget::in_use().most(ANSWER_BYTES) {
+                return;
+            }
             let mut answer = Vec::new();
             // Memory is taken for what comes, not for what is announced.
             let read = pipe.by_ref().take(length).read_to_end(&mut answer);
             let whole = read.is_ok_and(|n| n as u64 == length);
-            if length > Budget::in_use().most(ANSWER_BYTES) || !whole || send.send(answer).is_err() {
+            if !whole || send.send(answer).is_err() {
                 return;
             }
         }

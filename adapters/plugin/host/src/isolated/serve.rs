@@ -39,7 +39,7 @@ pub fn serve(file: &Path, options: &LoadOptions) -> DataResult<()> {
             }
             let length = u64::from_le_bytes(length);
             let mut request = Vec::new();
-            let read = requests.by_ref().take(length.min(REQUEST_BYTES)).read_to_end(&mut request);
+            let read = (&mut requests).take(length.min(REQUEST_BYTES)).read_to_end(&mut request);
             if !read.is_ok_and(|n| n as u64 == length) || send.send(request).is_err() {
                 std::process::exit(0);
             }
