@@ -38,21 +38,37 @@ pub const TARGETS: [Target; 21] = [
     Target { name: "labels_cvat", file: "a.xml", read: |_, bytes| drop(labels::read_cvat(bytes, &STAMPS)) },
     Target { name: "labels_json", file: "a.json", read: |_, bytes| drop(labels::read_json(bytes)) },
     Target { name: "labels_parquet", file: "a.parquet", read: |path, _| drop(labels::read_file(path, None)) },
-    Target { name: "labels_pickle", file: "a.pickle", read: |_, bytes| drop(labels::read_pickle(bytes, &STAMPS)) },
+    Target {
+        name: "labels_pickle",
+        file: "a.pickle",
+        read: |_, bytes| drop(labels::read_pickle(bytes, &STAMPS)),
+    },
     Target { name: "mcap", file: "a.mcap", read: |path, _| recording(&vice_locobot::Locobot, path) },
     Target { name: "mesh", file: "a.ply", read: |path, _| drop(vice_depth::Mesh::read(path)) },
     Target { name: "picture", file: "a.png", read: picture },
     Target { name: "rigid", file: "a.yaml", read: |path, _| drop(rigid_file::read_world_from_cloud(path)) },
-    Target { name: "scan", file: "a.ply", read: |path, _| drop(vice_depth::read_scan_points(path, &cloud_options())) },
+    Target {
+        name: "scan",
+        file: "a.ply",
+        read: |path, _| drop(vice_depth::read_scan_points(path, &cloud_options())),
+    },
     Target { name: "table", file: "a.parquet", read: |path, _| drop(tables::read(path)) },
     Target { name: "tracks", file: "a.npz", read: tracks },
     Target { name: "trajectory", file: "a.txt", read: poses },
-    Target { name: "vice_toml", file: "vice.toml", read: |_, bytes| drop(ViceToml::parse(&String::from_utf8_lossy(bytes))) },
+    Target {
+        name: "vice_toml",
+        file: "vice.toml",
+        read: |_, bytes| drop(ViceToml::parse(&String::from_utf8_lossy(bytes))),
+    },
 ];
 
 /// Stamps of the frames that labels count.
-const STAMPS: [Stamp; 4] =
-    [Stamp::from_nanos(0), Stamp::from_nanos(50_000_000), Stamp::from_nanos(100_000_000), Stamp::from_nanos(150_000_000)];
+const STAMPS: [Stamp; 4] = [
+    Stamp::from_nanos(0),
+    Stamp::from_nanos(50_000_000),
+    Stamp::from_nanos(100_000_000),
+    Stamp::from_nanos(150_000_000),
+];
 
 /// The target of a name.
 ///
@@ -116,8 +132,7 @@ fn colmap(path: &Path, bytes: &[u8]) {
 }
 
 fn film(path: &Path, _: &[u8]) {
-    const DESCRIPTION: &str =
-        "film = \"film.mov\"\nstamps = \"stamps.txt\"\n[camera]\nsize = [64, 48]\nintrinsics = [50.0, 50.0, 31.5, 23.5]\n";
+    const DESCRIPTION: &str = "film = \"film.mov\"\nstamps = \"stamps.txt\"\n[camera]\nsize = [64, 48]\nintrinsics = [50.0, 50.0, 31.5, 23.5]\n";
     let Some(folder) = path.parent() else { return };
     fs::write(folder.join("vice-video.toml"), DESCRIPTION).expect("a file");
     fs::write(folder.join("stamps.txt"), "10\n20\n30\n40\n").expect("a file");
@@ -152,7 +167,14 @@ fn read_all(dataset: &dyn Dataset) {
     for stream in dataset.streams() {
         drop(dataset.trajectory(&stream));
     }
-    drop((dataset.imu(), dataset.cloud(), dataset.mesh(), dataset.facts(), dataset.checks(), dataset.suspicions()));
+    drop((
+        dataset.imu(),
+        dataset.cloud(),
+        dataset.mesh(),
+        dataset.facts(),
+        dataset.checks(),
+        dataset.suspicions(),
+    ));
 }
 
 /// An input that is a little different, the same for the same dice: bits, bytes and whole words are changed, parts are cut
@@ -195,7 +217,8 @@ pub fn mutate(seed: &[u8], other: &[u8], words: &[Vec<u8>], dice: &mut SplitMix)
                 bytes.splice(at..at, foreign);
             }
             _ => {
-                let word = words.get(dice.below(words.len().max(1) as u64) as usize).cloned().unwrap_or_default();
+                let word =
+                    words.get(dice.below(words.len().max(1) as u64) as usize).cloned().unwrap_or_default();
                 let end = at + (word.len() * dice.below(2) as usize).min(rest);
                 bytes.splice(at..end, word);
             }

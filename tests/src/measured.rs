@@ -90,7 +90,8 @@ fn cpu_of(pid: u32) -> f64 {
     /// Ticks in a second; all systems of Linux that this is tested on have as many.
     const TICKS: f64 = 100.0;
     // In the user's code and in the kernel's: the 14th and 15th word.
-    let ticks = |words: &[String]| Some(words.get(11)?.parse::<f64>().ok()? + words.get(12)?.parse::<f64>().ok()?);
+    let ticks =
+        |words: &[String]| Some(words.get(11)?.parse::<f64>().ok()? + words.get(12)?.parse::<f64>().ok()?);
     status_words(pid).and_then(|words| ticks(&words)).map_or(f64::NAN, |ticks| ticks / TICKS)
 }
 

@@ -49,7 +49,8 @@ pub fn main_from(args: impl IntoIterator<Item = OsString>, itself: Itself) -> u8
     };
     let verbosity = terminal::Verbosity::new(cli.quiet, cli.verbose);
     terminal::show_warnings(verbosity);
-    let settings = Instructions::from_environment().map(drop).and_then(|()| Budget::from_environment().map(drop));
+    let settings =
+        Instructions::from_environment().map(drop).and_then(|()| Budget::from_environment().map(drop));
     if let Err(wrong) = settings {
         let error = terminal::usage(wrong);
         terminal::print_error(&error);

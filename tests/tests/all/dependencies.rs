@@ -25,7 +25,9 @@ fn each_direct_dependency_has_its_reason() {
     }
     assert_eq!(listed, asked);
     // No package goes past the list.
-    for member in manifest.split("members = [").nth(1).unwrap().split(']').next().unwrap().split('"').skip(1).step_by(2) {
+    for member in
+        manifest.split("members = [").nth(1).unwrap().split(']').next().unwrap().split('"').skip(1).step_by(2)
+    {
         for line in text(&format!("{member}/Cargo.toml")).lines() {
             let asks = line.contains("version = \"") && line.contains(" = {") || line.contains("git = ");
             assert!(!asks, "{member}: `{line}` is no dependency of the workspace");

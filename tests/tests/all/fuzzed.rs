@@ -34,7 +34,10 @@ fn words() -> Vec<Vec<u8>> {
     for name in ["text.dict", "binary.dict"] {
         let text = fs::read_to_string(root().join("fuzz/dictionaries").join(name)).unwrap();
         for line in text.lines().filter(|line| line.starts_with('"')) {
-            let line = line.strip_prefix('"').and_then(|l| l.strip_suffix('"')).unwrap_or_else(|| panic!("{name}: {line}"));
+            let line = line
+                .strip_prefix('"')
+                .and_then(|l| l.strip_suffix('"'))
+                .unwrap_or_else(|| panic!("{name}: {line}"));
             let mut word = Vec::new();
             let mut rest = line.chars();
             while let Some(c) = rest.next() {

@@ -5,22 +5,13 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use rayon::prelude::*;
-use vice_core::budget::Budget;
 use vice_core::error::{DataError, DataResult};
 
 use super::bytes::Bytes;
+use super::claims::{FREE_BYTES, Unpacked, over_budget};
 use super::indexed::{Indexed, Listed};
 use super::{Locator, Payload, Scan, Visitor};
 
-/// Bytes beyond which a block is refused: recorders write blocks of about a megabyte, or of one message.
-const MAX_BLOCK_BYTES: u64 = 1 << 30;
-/// Bytes that any block may unpack to, however small it is.
-const FREE_BYTES: u64 = 64 << 20;
-/// How many times its size a larger one may unpack to: no robot sees that much of nothing.
-const MOST_TIMES: u64 = 64;
-/// Bytes that the blocks of any file may unpack to together, and how many times its size those of a larger one may.
-const FREE_FILE_BYTES: u64 = 256 << 20;
-const MOST_TIMES_OF_FILE: u64 = 256;
 /// Bytes that are unpacked at once by several threads, beside the first block of them.
 const BATCH_BYTES: u64 = 64 << 20;
 /// Bytes reserved on the word of a header, before any data is seen: so many, or so many times those that are stored.
@@ -130,15 +121,6 @@ pub(super) fn decompress(
         Ok(_) if out.len() as u64 != size => Some(format!("has {} bytes, its header says {size}", out.len())),
         Ok(_) => None,
     }
-}
-
-/// Why a block of so many bytes is not unpacked to as many as its header says.
-fn over_budget(size: u64, stored: u64) -> Option<String> {
-    let usual = FREE_BYTES.max(stored.saturating_mul(MOST_TIMES)).min(MAX_BLOCK_BYTES);
-    let most = Budget::in_use().most(usual);
-    let raised = Budget::raised(size.max(stored), usual);
-    (size.max(stored) > most)
-        .then(|| format!("claims {size} bytes in {stored}, more than the budget of {most} ({raised})"))
 }
 
 /// Random access to bytes of a file or of memory.
@@ -439,28 +421,6 @@ impl BlockFile {
             scan.damaged(&DataError::new(problem).at(path));
         }
         self.bytes.all_had()
-    }
-}
-
-/// What the blocks of a file unpack to: each may be small enough and all of them together too much.
-struct Unpacked {
-    bytes: u64,
-    usual: u64,
-}
-
-impl Unpacked {
-    fn of(file_bytes: u64) -> Self {
-        Self { bytes: 0, usual: FREE_FILE_BYTES.max(file_bytes.saturating_mul(MOST_TIMES_OF_FILE)) }
-    }
-
-    fn add(&mut self, block: &Block) -> DataResult<()> {
-        if block.compression == Compression::None {
-            return Ok(());
-        }
-        self.bytes = self.bytes.saturating_add(block.size.min(MAX_BLOCK_BYTES));
-        Budget::in_use().check(self.bytes, "bytes", self.usual).map_err(|e| {
-            DataError::new(format!("the chunks up to here unpack to too much, the rest is left out: {e}"))
-        })
     }
 }
 

@@ -158,7 +158,10 @@ impl Db3 {
                     unpacked += read.len() as u64;
                     // Of all messages together no more than the file could hold.
                     if self.compressed && beyond_usual(self.len, unpacked) > most_beyond_usual() {
-                        return Err(DataError::new(format!("up to message {id} they unpack to too much: {}", too_much(self.len))));
+                        return Err(DataError::new(format!(
+                            "up to message {id} they unpack to too much: {}",
+                            too_much(self.len)
+                        )));
                     }
                     &read
                 }

@@ -95,9 +95,12 @@ pub(super) fn unpack(path: &Path) -> DataResult<Copy> {
         }
     };
     if done > limit {
-        let problem = format!("the compressed file of {stored} bytes unpacks to more than the budget of {limit} bytes");
+        let problem =
+            format!("the compressed file of {stored} bytes unpacks to more than the budget of {limit} bytes");
         let raised = Budget::raised(2 * limit, usual);
-        return Err(DataError::new(problem).at(path).hint(format!("if that is right, unpack it with `zstd -d`, or {raised}")));
+        return Err(DataError::new(problem)
+            .at(path)
+            .hint(format!("if that is right, unpack it with `zstd -d`, or {raised}")));
     }
     Ok(Copy { path: copy, _folder: folder, damage })
 }

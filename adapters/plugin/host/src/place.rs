@@ -20,7 +20,10 @@ pub(crate) fn is_own(path: &Path) -> bool {
     let Ok(real) = path.canonicalize() else { return false };
     let home = directories::BaseDirs::new().map(|dirs| dirs.home_dir().to_path_buf());
     let own = [home, crate::search::user_folder()];
-    own.into_iter().flatten().filter_map(|folder| folder.canonicalize().ok()).any(|folder| real.starts_with(folder))
+    own.into_iter()
+        .flatten()
+        .filter_map(|folder| folder.canonicalize().ok())
+        .any(|folder| real.starts_with(folder))
 }
 
 /// Looks at a library and its folder.

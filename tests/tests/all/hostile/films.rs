@@ -42,7 +42,11 @@ fn resources_of_a_sparse_film_of_two_billion_frames() {
     // What follows the index is one box that goes on to the end of the file.
     let bytes = [film(12, 2_000_000_000), [0, 0, 0, 0].to_vec(), b"mdat".to_vec()].concat();
     let flight = flight(&bytes, 24_000_001_000);
-    refused("two billion frames", &["info", &flight.text("film")], &["film.mov", "2000000000 frames", "VICE_BUDGET"]);
+    refused(
+        "two billion frames",
+        &["info", &flight.text("film")],
+        &["film.mov", "2000000000 frames", "VICE_BUDGET"],
+    );
 }
 
 #[test]
@@ -52,7 +56,12 @@ fn resources_of_films_within_the_budget() {
     let ran = within_limits("3.9 million frames", &["info", &many.text("film")]);
     assert!(ran.run.code != 0 && ran.run.stderr.contains("3900000"), "{}{}", ran.run.stdout, ran.run.stderr);
     // An index that is one hole.
-    let bytes = [boxed(b"ftyp", b"qt  "), (3_000_000_000_u32).to_be_bytes().to_vec(), b"moov".to_vec()].concat();
+    let bytes =
+        [boxed(b"ftyp", b"qt  "), (3_000_000_000_u32).to_be_bytes().to_vec(), b"moov".to_vec()].concat();
     let hole = flight(&bytes, 4_000_000_000);
-    refused("an index of 3 GB", &["info", &hole.text("film")], &["film.mov", "bytes of an index", "VICE_BUDGET"]);
+    refused(
+        "an index of 3 GB",
+        &["info", &hole.text("film")],
+        &["film.mov", "bytes of an index", "VICE_BUDGET"],
+    );
 }

@@ -60,7 +60,12 @@ fn the_journal_says_what_of_it_is_damaged_and_keeps_it() {
     let damaged: Vec<u8> = lines[..last].concat().into_iter().chain(vec![b'\n'; 600]).collect();
     fs::write(run.path("my.json.journal"), &damaged).unwrap();
     let said = said_at_start(&run);
-    assert!(said.contains("cannot be read") && said.contains("made after") && !said.contains("never acknowledged"), "{said}");
+    assert!(
+        said.contains("cannot be read")
+            && said.contains("made after")
+            && !said.contains("never acknowledged"),
+        "{said}"
+    );
     assert_eq!(fs::read(run.path("my.json.journal.damaged")).unwrap(), damaged);
     assert_eq!(frames_of_point(&run), [0, 1, 2, 3, 4, 5]);
 }

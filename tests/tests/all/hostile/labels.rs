@@ -41,10 +41,20 @@ fn converted(what: &str, name: &str, bytes: &[u8], words: &[&str]) {
 
 #[test]
 fn resources_of_arrays_of_numpy() {
-    for shape in ["(5, 1000000000000, 2)", "(0, 1000000000000, 2)", "(1, 5, 4611686018427387904, 2)", "(18446744073709551615, 18446744073709551615, 2)"] {
+    for shape in [
+        "(5, 1000000000000, 2)",
+        "(0, 1000000000000, 2)",
+        "(1, 5, 4611686018427387904, 2)",
+        "(18446744073709551615, 18446744073709551615, 2)",
+    ] {
         converted(shape, "tracks.npy", &npy("<f4", shape, &[0; 40]), &["VICE_BUDGET"]);
     }
-    converted("a count that is cut off", "tracks.npy", &npy("<f4", "(5, 10000000, 2)", &[0; 40]), &["cut off"]);
+    converted(
+        "a count that is cut off",
+        "tracks.npy",
+        &npy("<f4", "(5, 10000000, 2)", &[0; 40]),
+        &["cut off"],
+    );
     let huge = [b"\x93NUMPY\x02\0", &u32::MAX.to_le_bytes()[..], b"{'descr'"].concat();
     converted("a header of 4 GB", "tracks.npy", &huge, &[]);
 }
@@ -59,7 +69,9 @@ fn resources_of_archives_of_numpy() {
         converted("an archive of a gigabyte", "tracks.npz", &zip("tracks.npy", deflated, 0, size), &[]);
     }
     let array = npy("<f4", "(5, 1, 2)", &[0; 40]);
-    let stored = [&[1][..], &(array.len() as u16).to_le_bytes(), &(!(array.len() as u16)).to_le_bytes(), &array].concat();
+    let stored =
+        [&[1][..], &(array.len() as u16).to_le_bytes(), &(!(array.len() as u16)).to_le_bytes(), &array]
+            .concat();
     let good = zip("tracks.npy", &stored, crc32(&array), array.len() as u32);
     // The archive itself is one: what is refused above is refused for what it holds.
     let flight = Flight::new();
@@ -73,7 +85,11 @@ fn resources_of_archives_of_numpy() {
 fn resources_of_labels_with_holes_and_depth() {
     let flight = Flight::new();
     let run = flight.text("run");
-    for (name, head) in [("labels.csv", &b"point,timestamp_ns,u_px,v_px,keyframe\n"[..]), ("labels.parquet", b"PAR1"), ("labels.npy", b"\x93NUMPY\x01\0")] {
+    for (name, head) in [
+        ("labels.csv", &b"point,timestamp_ns,u_px,v_px,keyframe\n"[..]),
+        ("labels.parquet", b"PAR1"),
+        ("labels.npy", b"\x93NUMPY\x01\0"),
+    ] {
         let file = format!("sparse/{name}");
         flight.write_sparse(&file, head, 1 << 40);
         let (file, out) = (flight.text(&file), flight.text("out.json"));

@@ -58,7 +58,9 @@ fn leftovers_of_a_report_whose_pictures_cannot_be_decoded() {
     let ran = vice(&[&fixed[..], &["--json", &flight.text("out.json")]].concat());
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     let says = |text: &str| {
-        let line = text.lines().find(|l| l.starts_with("warning") && l.contains("page.html") || l.contains("out.json:"));
+        let line = text
+            .lines()
+            .find(|l| l.starts_with("warning") && l.contains("page.html") || l.contains("out.json:"));
         line.is_some_and(|l| l.contains("5 of 5 pictures cannot be shown") && l.contains(".png"))
     };
     assert!(says(&ran.stderr), "{}", ran.stderr);

@@ -42,7 +42,11 @@ fn within_limits(what: &str, args: &[&str]) -> Measured {
     let said = format!("{what}: {}{}", ran.run.stdout, ran.run.stderr);
     assert!(ran.seconds() < MOST_SECONDS, "{:.2} s of {:.2} s: {said}", ran.seconds(), ran.wall_s);
     assert!(!(ran.peak_mb >= MOST_MB), "{:.0} MB: {said}", ran.peak_mb);
-    assert!([0, 1, 2, 3].contains(&ran.run.code) && !ran.run.stderr.contains("panicked"), "exit {}: {said}", ran.run.code);
+    assert!(
+        [0, 1, 2, 3].contains(&ran.run.code) && !ran.run.stderr.contains("panicked"),
+        "exit {}: {said}",
+        ran.run.code
+    );
     ran
 }
 
@@ -50,7 +54,13 @@ fn within_limits(what: &str, args: &[&str]) -> Measured {
 fn refused(what: &str, args: &[&str], words: &[&str]) {
     let ran = within_limits(what, args);
     let errors: Vec<&str> = ran.run.stderr.lines().filter(|l| l.starts_with("error")).collect();
-    assert!(ran.run.code != 0 && errors.len() == 1, "{what}: exit {}: {}{}", ran.run.code, ran.run.stdout, ran.run.stderr);
+    assert!(
+        ran.run.code != 0 && errors.len() == 1,
+        "{what}: exit {}: {}{}",
+        ran.run.code,
+        ran.run.stdout,
+        ran.run.stderr
+    );
     for word in words {
         assert!(errors[0].contains(word), "{what}: `{word}` is not in: {}", errors[0]);
     }

@@ -108,5 +108,8 @@ fn resources_of_the_size_in_a_calibration() {
     flight.write("run/mav0/cam0/sensor.yaml", sensor.as_bytes());
     let (run, labels) = (flight.text("run"), flight.text("labels.csv"));
     within_limits("info", &["info", &run]);
-    within_limits("evaluate", &["evaluate", &run, "--labels", &labels, "--estimate", "ground-truth", "--reference", "none"]);
+    within_limits(
+        "evaluate",
+        &["evaluate", &run, "--labels", &labels, "--estimate", "ground-truth", "--reference", "none"],
+    );
 }

@@ -12,7 +12,9 @@ fn told(path: &Path) -> (Vec<String>, String) {
     let ran = within_limits(text(path), &["info", text(path)]);
     assert_eq!(ran.run.code, 0, "{}", ran.run.stderr);
     let name = path.file_stem().unwrap().to_str().unwrap().to_string();
-    let own = |line: &&str| !line.contains("json") && !line.contains(&name) && !line.trim_start().starts_with("damage");
+    let own = |line: &&str| {
+        !line.contains("json") && !line.contains(&name) && !line.trim_start().starts_with("damage")
+    };
     (ran.run.stdout.lines().filter(own).map(str::to_string).collect(), ran.run.stdout.clone())
 }
 
@@ -23,13 +25,25 @@ fn a_recording_with_one_json_or_protobuf_topic() {
     let (with, _) = told(&folder.join("valid_json_middle.mcap"));
     assert!(without.len() > 5, "{without:?}");
     for line in &without {
-        assert!(with.contains(line), "`{line}` is not told of the recording that has a topic in JSON: {with:?}");
+        assert!(
+            with.contains(line),
+            "`{line}` is not told of the recording that has a topic in JSON: {with:?}"
+        );
     }
     let (_, first) = told(&folder.join("valid_json_first.mcap"));
-    let topics = [("color/image_raw", 2), ("color/camera_info", 1), ("/tf", 1), ("/imu", 1), ("/odom", 1), ("/pose", 1)];
+    let topics = [
+        ("color/image_raw", 2),
+        ("color/camera_info", 1),
+        ("/tf", 1),
+        ("/imu", 1),
+        ("/odom", 1),
+        ("/pose", 1),
+    ];
     for (topic, count) in topics {
         let said = first.lines().any(|line| {
-            line.contains(topic) && line.contains(&format!(" {count} message")) && !line.contains("/tf_static")
+            line.contains(topic)
+                && line.contains(&format!(" {count} message"))
+                && !line.contains("/tf_static")
         });
         assert!(said, "{topic} with {count}: {first}");
     }
@@ -76,11 +90,8 @@ fn record(header: &[Vec<u8>], data: &[u8]) -> Vec<u8> {
 
 /// A chunk of a bag: what it holds, packed, and the size that it claims.
 fn chunk(packed: &[u8], compression: &str, size: u32) -> Vec<u8> {
-    let header = [
-        field("op", &[5]),
-        field("compression", compression.as_bytes()),
-        field("size", &size.to_le_bytes()),
-    ];
+    let header =
+        [field("op", &[5]), field("compression", compression.as_bytes()), field("size", &size.to_le_bytes())];
     record(&header, packed)
 }
 
@@ -123,16 +134,26 @@ fn resources_of_packed_recordings_and_messages() {
         encoder.write_all(&zeros).unwrap();
     }
     encoder.finish().unwrap();
-    refused("a packed file", &["info", text(&path)], &["run.bag.zstd", "unpacks to more than the budget", "VICE_BUDGET"]);
+    refused(
+        "a packed file",
+        &["info", text(&path)],
+        &["run.bag.zstd", "unpacks to more than the budget", "VICE_BUDGET"],
+    );
     // Messages that are packed one by one.
     let path = folder.path().join("messages.mcap");
-    let mut writer = mcap::WriteOptions::new().compression(None).create(std::fs::File::create(&path).unwrap()).unwrap();
+    let mut writer =
+        mcap::WriteOptions::new().compression(None).create(std::fs::File::create(&path).unwrap()).unwrap();
     let schema = writer.add_schema("tf2_msgs/msg/TFMessage", "ros2msg", b"").unwrap();
     let channel = writer.add_channel(schema, "/tf", "cdr", &Default::default()).unwrap();
     let bomb = zstd::bulk::compress(&vec![0; 200 << 20], 1).unwrap();
     for sequence in 0..20 {
         let time = 1_700_000_000_000_000_000 + u64::from(sequence);
-        let header = mcap::records::MessageHeader { channel_id: channel, sequence, log_time: time, publish_time: time };
+        let header = mcap::records::MessageHeader {
+            channel_id: channel,
+            sequence,
+            log_time: time,
+            publish_time: time,
+        };
         writer.write_to_known_channel(&header, &bomb).unwrap();
     }
     writer.finish().unwrap();
@@ -146,11 +167,16 @@ fn resources_of_counts_in_a_recording() {
     let path = folder.path().join("counts.bag");
     // A tf message that claims 2^32 - 1 transforms, an image of 2^31 columns, and a string of 4 GB.
     let connection = |number: u32, topic: &str, kind: &str| {
-        let header = [field("op", &[7]), field("conn", &number.to_le_bytes()), field("topic", topic.as_bytes())];
+        let header =
+            [field("op", &[7]), field("conn", &number.to_le_bytes()), field("topic", topic.as_bytes())];
         record(&header, &[field("type", kind.as_bytes()), field("md5sum", b"*")].concat())
     };
     let message = |number: u32, data: &[u8]| {
-        let header = [field("op", &[2]), field("conn", &number.to_le_bytes()), field("time", &[1, 0, 0, 0, 2, 0, 0, 0])];
+        let header = [
+            field("op", &[2]),
+            field("conn", &number.to_le_bytes()),
+            field("time", &[1, 0, 0, 0, 2, 0, 0, 0]),
+        ];
         record(&header, data)
     };
     let head = [&7_u32.to_le_bytes()[..], &[1, 0, 0, 0, 2, 0, 0, 0]].concat();

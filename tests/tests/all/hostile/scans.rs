@@ -12,7 +12,12 @@ fn fitted(what: &str, name: &str, bytes: &[u8], length: Option<u64>) {
     let (run, file) = (flight.text("run"), flight.text(name));
     let ran = within_limits(what, &["floor", "fit", &run, "--cloud", &file]);
     let errors: Vec<&str> = ran.run.stderr.lines().filter(|l| l.starts_with("error")).collect();
-    assert!(ran.run.code != 0 && errors.len() == 1 && errors[0].contains(name), "{what}: {}{}", ran.run.stdout, ran.run.stderr);
+    assert!(
+        ran.run.code != 0 && errors.len() == 1 && errors[0].contains(name),
+        "{what}: {}{}",
+        ran.run.stdout,
+        ran.run.stderr
+    );
 }
 
 #[test]
@@ -22,8 +27,17 @@ fn resources_of_ply_files() {
     for (what, text) in [
         ("points", head(&format!("element vertex 1000000000000000000\n{xyz}"), "binary_little_endian")),
         ("points as text", head(&format!("element vertex 1000000000000000000\n{xyz}"), "ascii")),
-        ("an element without properties", head(&format!("element nothing 1000000000000000000\nelement vertex 3\n{xyz}"), "binary_little_endian")),
-        ("rows of text without properties", head(&format!("element nothing 1000000000000000000\nelement vertex 3\n{xyz}"), "ascii")),
+        (
+            "an element without properties",
+            head(
+                &format!("element nothing 1000000000000000000\nelement vertex 3\n{xyz}"),
+                "binary_little_endian",
+            ),
+        ),
+        (
+            "rows of text without properties",
+            head(&format!("element nothing 1000000000000000000\nelement vertex 3\n{xyz}"), "ascii"),
+        ),
         (
             "a list of 4 billion",
             head(&format!("element vertex 3\n{xyz}property list uint double w\n"), "binary_little_endian"),
@@ -101,6 +115,11 @@ fn resources_of_models_of_colmap() {
         }
         flight.write(&format!("model/{name}"), &[&many[..], &[0; 100]].concat());
         let ran = within_limits(name, &["info", &flight.text("model")]);
-        assert!(ran.run.code != 0 && ran.run.stderr.contains("error"), "{name}: {}{}", ran.run.stdout, ran.run.stderr);
+        assert!(
+            ran.run.code != 0 && ran.run.stderr.contains("error"),
+            "{name}: {}{}",
+            ran.run.stdout,
+            ran.run.stderr
+        );
     }
 }

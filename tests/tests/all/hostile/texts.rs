@@ -18,7 +18,12 @@ fn resources_of_yaml() {
     }
     let long = format!("{SENSOR}note: \"{}\"\n", "x".repeat(5 << 20));
     let keys: String = (0..200_000).map(|i| format!("k{i}: 0\n")).collect();
-    for (what, text) in [("nested", nested), ("aliases", aliases), ("a long text", long), ("many keys", SENSOR.to_string() + &keys)] {
+    for (what, text) in [
+        ("nested", nested),
+        ("aliases", aliases),
+        ("a long text", long),
+        ("many keys", SENSOR.to_string() + &keys),
+    ] {
         let flight = Flight::new();
         flight.write("run/mav0/cam0/sensor.yaml", text.as_bytes());
         let ran = within_limits(what, &["info", &flight.text("run")]);
@@ -36,7 +41,11 @@ fn resources_of_toml_and_json() {
         let file = flight.text(name);
         evaluated(name, &flight, &["--estimate", "ground-truth", "--calibration", &file], &[name]);
     }
-    refused("a result", &["report", &flight.text("deep.json"), "--out", &flight.text("page.html")], &["deep.json"]);
+    refused(
+        "a result",
+        &["report", &flight.text("deep.json"), "--out", &flight.text("page.html")],
+        &["deep.json"],
+    );
     assert!(!flight.path("page.html").exists());
 }
 

@@ -121,7 +121,8 @@ impl Carried for PathBuf {
     }
 
     fn take(from: &mut Reader<'_>) -> Result<Self, Fault> {
-        vice_abi::path_from_bytes(from.bytes()?).ok_or_else(|| "a path of its answer is not UTF-8".to_string())
+        vice_abi::path_from_bytes(from.bytes()?)
+            .ok_or_else(|| "a path of its answer is not UTF-8".to_string())
     }
 }
 

@@ -38,7 +38,11 @@ struct Opened {
 
 impl Carried for Opened {
     fn put(&self, out: &mut Writer) {
-        out.put(&self.name).list(&self.cameras).list(&self.has_depth).list(&self.streams).list(&self.relative);
+        out.put(&self.name)
+            .list(&self.cameras)
+            .list(&self.has_depth)
+            .list(&self.streams)
+            .list(&self.relative);
     }
 
     fn take(from: &mut Reader<'_>) -> Result<Self, String> {
@@ -94,7 +98,12 @@ fn named(call: u8, name: &str) -> Writer {
 }
 
 impl IsolatedDataset {
-    pub(super) fn open(process: Process, format: String, path: &Path, options: &OpenOptions) -> DataResult<Self> {
+    pub(super) fn open(
+        process: Process,
+        format: String,
+        path: &Path,
+        options: &OpenOptions,
+    ) -> DataResult<Self> {
         let settings: Vec<[String; 2]> =
             options.settings.iter().map(|(key, value)| [key.clone(), value.clone()]).collect();
         let mut open = request(calls::OPEN);

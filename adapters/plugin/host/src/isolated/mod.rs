@@ -49,7 +49,10 @@ struct Hello {
 
 impl Carried for Hello {
     fn put(&self, out: &mut Writer) {
-        out.put(&self.info).put(&self.path).put(&[self.complete_table, self.thread_safe]).put(&self.abi_version);
+        out.put(&self.info)
+            .put(&self.path)
+            .put(&[self.complete_table, self.thread_safe])
+            .put(&self.abi_version);
     }
 
     fn take(from: &mut Reader<'_>) -> Result<Self, String> {

@@ -47,6 +47,8 @@ struct Inner {
     child: Child,
     requests: ChildStdin,
     answers: Receiver<Vec<u8>>,
+    /// Ends when all that it said was passed on.
+    log: Receiver<()>,
     /// How it ended.
     ended: Option<String>,
 }
@@ -65,13 +67,17 @@ impl Process {
         if options.allow_writable {
             command.arg("--allow-writable-plugin");
         }
-        let mut child =
-            command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().map_err(failed)?;
+        let mut child = command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(failed)?;
         let nothing = || DataError::new("the process of the plugin has no pipes").at(file);
         let requests = child.stdin.take().ok_or_else(nothing)?;
         let answers = answers_of(child.stdout.take().ok_or_else(nothing)?);
-        tell_log(child.stderr.take().ok_or_else(nothing)?, file.to_path_buf());
-        let inner = Mutex::new(Inner { child, requests, answers, ended: None });
+        let log = tell_log(child.stderr.take().ok_or_else(nothing)?, file.to_path_buf());
+        let inner = Mutex::new(Inner { child, requests, answers, log, ended: None });
         Ok(Self { file: file.to_path_buf(), inner })
     }
 
@@ -140,6 +146,8 @@ impl Drop for Process {
         // What it holds goes with it.
         let _ = inner.child.kill();
         let _ = inner.child.wait();
+        // What it said last; not for long, since what it started may hold the pipe open.
+        let _ = inner.log.recv_timeout(Duration::from_millis(500));
     }
 }
 
@@ -169,8 +177,11 @@ fn answers_of(mut pipe: impl Read + Send + 'static) -> Receiver<Vec<u8>> {
 }
 
 /// Passes on what the process says, up to a limit; the rest is read and dropped, so that it does not wait for a reader.
-fn tell_log(pipe: impl Read + Send + 'static, file: PathBuf) {
+fn tell_log(pipe: impl Read + Send + 'static, file: PathBuf) -> Receiver<()> {
+    let (done, all_told) = channel();
     std::thread::spawn(move || {
+        // Dropped at the end of the thread, which is how the end is told.
+        let _done: std::sync::mpsc::Sender<()> = done;
         let mut pipe = BufReader::new(pipe);
         let mut lines = 0;
         loop {
@@ -199,6 +210,7 @@ fn tell_log(pipe: impl Read + Send + 'static, file: PathBuf) {
             }
         }
     });
+    all_told
 }
 
 /// How a process died, in words that follow a name: `crashes (abort, signal 6)`.

@@ -5,7 +5,9 @@ use nalgebra::Point3;
 use vice_abi::contract;
 use vice_abi::export::values as given;
 use vice_core::camera::Camera;
-use vice_core::dataset::{CloudRef, CloudSource, DepthImage, Fact, Floor, FormatInfo, Image, Probe, SettingInfo};
+use vice_core::dataset::{
+    CloudRef, CloudSource, DepthImage, Fact, Floor, FormatInfo, Image, Probe, SettingInfo,
+};
 use vice_core::error::{DataError, ErrorKind, Place, one_line};
 use vice_core::finding::{Finding, Number, State};
 use vice_core::frames::Rigid;
@@ -34,7 +36,17 @@ macro_rules! structure {
 }
 
 structure!(contract::Rigid { translation_m, rotation_wxyz });
-structure!(contract::Camera { width_px, height_px, fx_px, fy_px, cx_px, cy_px, model, coefficient_count, coefficients });
+structure!(contract::Camera {
+    width_px,
+    height_px,
+    fx_px,
+    fy_px,
+    cx_px,
+    cy_px,
+    model,
+    coefficient_count,
+    coefficients
+});
 structure!(contract::Pose { stamp_ns, world_from_body });
 structure!(contract::ImuSample { stamp_ns, gyro_body_rad_s, accel_body_m_s2 });
 structure!(contract::InertialState {
@@ -190,7 +202,12 @@ impl Carried for CloudRef {
 
 impl Carried for Suspicion {
     fn put(&self, out: &mut Writer) {
-        out.put(&self.code).put(&self.about).put(&self.message).put(&self.evidence).put(&self.advice).put(&self.count);
+        out.put(&self.code)
+            .put(&self.about)
+            .put(&self.message)
+            .put(&self.evidence)
+            .put(&self.advice)
+            .put(&self.count);
     }
 
     fn take(from: &mut Reader<'_>) -> Result<Self, Fault> {
