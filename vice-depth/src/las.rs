@@ -82,6 +82,31 @@ fn check_records(file: &mut File, length: u64) -> DataResult<()> {
                 .hint("the file is cut off, or no LAS file"));
         }
     }
+    if large {
+        let (start, count) = (bytes(235, 8).unwrap_or(0), bytes(243, 4).unwrap_or(0));
+        check_extended(file, start, count, length)?;
+        file.rewind().map_err(failed)?;
+    }
+    Ok(())
+}
+
+/// Holds the length of each record after the points against what is left of the file.
+fn check_extended(file: &mut File, mut at: u64, count: u64, length: u64) -> DataResult<()> {
+    for _ in 0..count {
+        let mut head = [0; 60];
+        if file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(&mut head)).is_err() {
+            return Err(DataError::new("a record after the points is cut off").byte(at));
+        }
+        // After two reserved bytes, the name of its user and its number.
+        let mut size = [0; 8];
+        size.copy_from_slice(&head[20..28]);
+        let size = u64::from_le_bytes(size);
+        if size > length.saturating_sub(at + 60) {
+            let problem = format!("a record after the points claims {size} bytes, in a file of {length}");
+            return Err(DataError::new(problem).byte(at));
+        }
+        at += 60 + size;
+    }
     Ok(())
 }
 

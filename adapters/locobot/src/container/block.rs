@@ -393,7 +393,8 @@ impl BlockFile {
             });
             let batch: Vec<&Block> = [&blocks[at]].into_iter().chain(more).take(buffers.len()).collect();
             if let Err(error) = batch.iter().try_for_each(|block| unpacked.add(block)) {
-                scan.damaged(&error.at(path).byte(blocks[at].offset));
+                // First, since it says why what follows is missing.
+                scan.damage.insert(0, error.at(path).byte(blocks[at].offset).to_string());
                 break;
             }
             let each = batch.par_iter().zip(&mut buffers);
