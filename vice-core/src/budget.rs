@@ -105,11 +105,16 @@ mod tests {
 
     #[test]
     fn the_value_that_is_named_is_enough() {
-        for (claimed, usual) in [(1001, 1000), (2000, 1000), (2001, 1000), (u64::MAX, 3), (1 << 60, (1 << 20) + 1)] {
+        for (claimed, usual) in
+            [(1001, 1000), (2000, 1000), (2001, 1000), (u64::MAX, 3), (1 << 60, (1 << 20) + 1)]
+        {
             let error = Budget::default().check(claimed, "bytes", usual).unwrap_err();
             let hint = error.hint_text().unwrap();
             let value = hint.split_once("VICE_BUDGET=").unwrap().1.split(' ').next().unwrap();
-            assert!(Budget::parse(value).unwrap().check(claimed, "bytes", usual).is_ok(), "{claimed} of {usual}");
+            assert!(
+                Budget::parse(value).unwrap().check(claimed, "bytes", usual).is_ok(),
+                "{claimed} of {usual}"
+            );
         }
     }
 }

@@ -78,8 +78,10 @@ fn check_records(file: &mut File, length: u64) -> DataResult<()> {
         let count = count.unwrap_or(0);
         // No laser has measured so many points, whatever they are packed to.
         if count.saturating_mul(each) > length || count > 1 << 40 {
-            return Err(DataError::new(format!("the header promises {count} {what}, in a file of {length} bytes"))
-                .hint("the file is cut off, or no LAS file"));
+            return Err(DataError::new(format!(
+                "the header promises {count} {what}, in a file of {length} bytes"
+            ))
+            .hint("the file is cut off, or no LAS file"));
         }
     }
     if large {
@@ -116,7 +118,8 @@ fn check_chunks(file: &mut File, length: u64) -> DataResult<()> {
     /// Where the header says at which byte the points start, and the format of a point, whose highest bit is that of LAZ.
     const POINTS_AT: u64 = 96;
     const FORMAT_AT: u64 = 104;
-    let mut bytes = |at: u64, into: &mut [u8]| file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(into));
+    let mut bytes =
+        |at: u64, into: &mut [u8]| file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(into));
     let mut chunks = || -> std::io::Result<Option<(u64, u32)>> {
         let (mut long, mut short, mut format) = ([0; 8], [0; 4], [0]);
         bytes(FORMAT_AT, &mut format)?;
@@ -138,7 +141,8 @@ fn check_chunks(file: &mut File, length: u64) -> DataResult<()> {
     file.rewind().map_err(|e| DataError::new("cannot be read").because(e))?;
     match found {
         Some((table, chunks)) if u64::from(chunks) > length => {
-            Err(DataError::new(format!("{chunks} chunks are announced in a file of {length} bytes")).byte(table))
+            Err(DataError::new(format!("{chunks} chunks are announced in a file of {length} bytes"))
+                .byte(table))
         }
         _ => Ok(()),
     }
@@ -197,7 +201,8 @@ mod tests {
     fn a_table_of_chunks_is_counted_against_the_file() {
         let (_folder, path) = file("scan.laz", 5000);
         let mut bytes = std::fs::read(&path).unwrap();
-        let word = |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+        let word =
+            |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
         let points = word(&bytes, 96);
         let table = word(&bytes, points);
         bytes[table + 4..table + 8].copy_from_slice(&u32::MAX.to_le_bytes());

@@ -47,8 +47,11 @@ pub(super) fn read(bytes: &[u8]) -> DataResult<Vec<(String, Array)>> {
         read.map_err(|e| DataError::new(format!("the array `{name}` cannot be unpacked")).because(e))?;
         left = left.checked_sub(content.len() as u64).ok_or_else(|| {
             let claimed = budget.most(usual).max(entry.size());
-            DataError::new(format!("the archive unpacks to more than the budget of {} bytes", budget.most(usual)))
-                .hint(format!("where it is right, {}", Budget::raised(claimed, usual)))
+            DataError::new(format!(
+                "the archive unpacks to more than the budget of {} bytes",
+                budget.most(usual)
+            ))
+            .hint(format!("where it is right, {}", Budget::raised(claimed, usual)))
         })?;
         match array(&content, left) {
             Ok(array) => {
@@ -118,7 +121,10 @@ fn array(bytes: &[u8], most_bytes: u64) -> DataResult<Array> {
     let data = data.get(..count * size).ok_or_else(broken)?;
     if 8 * count as u64 > most_bytes {
         let hint = format!("where it is right, {}", Budget::raised(8 * count as u64, most_bytes));
-        return Err(DataError::new(format!("its {count} numbers take more than the budget of {most_bytes} bytes")).hint(hint));
+        return Err(DataError::new(format!(
+            "its {count} numbers take more than the budget of {most_bytes} bytes"
+        ))
+        .hint(hint));
     }
     let values =
         data.chunks_exact(size).map(|b| number(kind, b)).collect::<Option<Vec<f64>>>().ok_or_else(broken)?;
