@@ -6,8 +6,8 @@ use std::sync::OnceLock;
 use vice_core::dataset::{DatasetFactory, FormatInfo};
 use vice_core::error::{DataResult, one_line};
 use vice_core::registry::Registry;
-use vice_host::isolated::{self, IsolatedPlugin};
-use vice_host::{LoadOptions, Plugin, isolated_by_default, search};
+use vice_host::isolated::{self, IsolatedPlugin, isolated_by_default};
+use vice_host::{LoadOptions, Plugin, search};
 
 use crate::error::{RunError, RunResult};
 use crate::request::PluginsSpec;

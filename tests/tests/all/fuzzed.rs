@@ -12,9 +12,9 @@ use vice_tests::fuzzing::{TARGETS, Target, mutate};
 use vice_tests::root;
 
 /// Changed inputs of each target.
-const RUNS: u64 = 60;
+const RUNS: u64 = 16;
 /// Longest that one input may take. An optimised program is held to less by `fuzz/run`.
-const MOST: Duration = Duration::from_secs(2);
+const MOST: Duration = Duration::from_secs(5);
 /// All that is stored, bytes.
 const MOST_STORED: u64 = 300_000;
 

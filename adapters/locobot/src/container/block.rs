@@ -392,7 +392,8 @@ impl BlockFile {
                 together <= BATCH_BYTES
             });
             let batch: Vec<&Block> = [&blocks[at]].into_iter().chain(more).take(buffers.len()).collect();
-            if let Err(error) = batch.iter().try_for_each(|block| unpacked.add(block)) {
+            let mut packed = batch.iter().filter(|b| b.compression != Compression::None);
+            if let Err(error) = packed.try_for_each(|b| unpacked.add(b.size)) {
                 // First, since it says why what follows is missing.
                 scan.damage.insert(0, error.at(path).byte(blocks[at].offset).to_string());
                 break;

@@ -3,8 +3,6 @@
 use vice_core::budget::Budget;
 use vice_core::error::{DataError, DataResult};
 
-use super::block::{Block, Compression};
-
 /// Bytes beyond which a block is refused: recorders write blocks of about a megabyte, or of one message.
 const MAX_BLOCK_BYTES: u64 = 1 << 30;
 /// Bytes that any block may unpack to, however small it is.
@@ -35,11 +33,9 @@ impl Unpacked {
         Self { bytes: 0, usual: FREE_FILE_BYTES.max(file_bytes.saturating_mul(MOST_TIMES_OF_FILE)) }
     }
 
-    pub(super) fn add(&mut self, block: &Block) -> DataResult<()> {
-        if block.compression == Compression::None {
-            return Ok(());
-        }
-        self.bytes = self.bytes.saturating_add(block.size.min(MAX_BLOCK_BYTES));
+    /// Adds a block that is packed, by the size that it claims.
+    pub(super) fn add(&mut self, size: u64) -> DataResult<()> {
+        self.bytes = self.bytes.saturating_add(size.min(MAX_BLOCK_BYTES));
         Budget::in_use().check(self.bytes, "bytes", self.usual).map_err(|e| {
             DataError::new(format!("the chunks up to here unpack to too much, the rest is left out: {e}"))
         })

@@ -36,4 +36,4 @@ mod place;
 pub mod search;
 mod values;
 
-pub use library::{LoadOptions, Plugin, isolated_by_default};
+pub use library::{LoadOptions, Plugin};

@@ -22,11 +22,6 @@ pub struct LoadOptions {
     pub allow_writable: bool,
 }
 
-/// Whether a plugin runs in a process of its own where nobody said so: one that lies outside of the user's own folders does.
-pub fn isolated_by_default(path: &Path) -> bool {
-    !place::is_own(path)
-}
-
 /// A loaded plugin. Cheap to clone; its library stays loaded until the program ends.
 #[derive(Clone, Debug)]
 pub struct Plugin {

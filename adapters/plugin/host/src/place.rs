@@ -14,18 +14,6 @@ pub(crate) struct Place {
     pub(crate) warning: Option<String>,
 }
 
-/// Whether a library lies in the user's own folders: the home folder, or that of the user's plugins. What lies elsewhere
-/// was put there by a package, an administrator, a colleague or a script.
-pub(crate) fn is_own(path: &Path) -> bool {
-    let Ok(real) = path.canonicalize() else { return false };
-    let home = directories::BaseDirs::new().map(|dirs| dirs.home_dir().to_path_buf());
-    let own = [home, crate::search::user_folder()];
-    own.into_iter()
-        .flatten()
-        .filter_map(|folder| folder.canonicalize().ok())
-        .any(|folder| real.starts_with(folder))
-}
-
 /// Looks at a library and its folder.
 ///
 /// # Errors

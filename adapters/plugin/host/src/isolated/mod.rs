@@ -24,6 +24,16 @@ use process::Process;
 pub use process::{can_isolate, death, program_is};
 pub use serve::serve;
 
+/// Whether a plugin runs in a process of its own where nobody said so: one that lies outside of the user's own folders does,
+/// which are the home folder and that of the user's plugins. What lies elsewhere was put there by a package, an
+/// administrator, a colleague or a script.
+pub fn isolated_by_default(path: &Path) -> bool {
+    let Ok(real) = path.canonicalize() else { return true };
+    let home = directories::BaseDirs::new().map(|dirs| dirs.home_dir().to_path_buf());
+    let own = [home, crate::search::user_folder()].into_iter().flatten();
+    !own.filter_map(|folder| folder.canonicalize().ok()).any(|folder| real.starts_with(folder))
+}
+
 /// A plugin that runs in processes of its own. Cheap to clone.
 #[derive(Clone)]
 pub struct IsolatedPlugin {
