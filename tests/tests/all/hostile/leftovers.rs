@@ -68,16 +68,3 @@ fn leftovers_of_a_report_whose_pictures_cannot_be_decoded() {
     let later = vice(&["report", &flight.text("out.json"), "--out", &flight.text("later.html")]);
     assert!(later.code == 0 && says(&later.stderr), "{}{}", later.stdout, later.stderr);
 }
-
-#[cfg(unix)]
-#[test]
-fn leftovers_of_errors_keep_the_reason_of_the_system() {
-    let flight = Flight::new();
-    let (run, labels) = (flight.text("run"), flight.text("labels.csv"));
-    // A place that cannot be written to even by root: below a file.
-    flight.write("taken", b"");
-    let out = flight.text("taken/out.json");
-    let ran = vice(&["evaluate", &run, "--labels", &labels, "--estimate", "ground-truth", "--json", &out]);
-    assert!(ran.code != 0 && ran.stderr.contains("out.json"), "{}", ran.stderr);
-    assert!(ran.stderr.contains("Not a directory"), "{}", ran.stderr);
-}

@@ -91,8 +91,11 @@ fn plugins_that_answer_garbage_or_take_all_memory_are_an_error() {
         survived(&plugin, "garbage", place, "libhostile.so: ");
         assert_ne!(asked(&plugin, "garbage", place, "--isolate-plugins").run.code, 0, "{place}");
     }
-    survived(&plugin, "take", "open", "crashes");
-    survived(&plugin, "take", "image", "crashes");
+    // The system refuses it the memory, or its time ends first.
+    for place in ["open", "image"] {
+        survived(&plugin, "take", place, "libhostile.so: ");
+        assert_ne!(asked(&plugin, "take", place, "--isolate-plugins").run.code, 0, "{place}");
+    }
 }
 
 /// Three seconds, since the plugin is given as many.
