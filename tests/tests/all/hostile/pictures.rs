@@ -15,7 +15,7 @@ fn black_png(width: u32, height: u32) -> Vec<u8> {
         b"\x89PNG\r\n\x1a\n".to_vec(),
         png_chunk(b"IHDR", &head),
         png_chunk(b"IDAT", &pixels),
-        png_chunk(b"IEND"),
+        png_chunk(b"IEND", b""),
     ]
     .concat()
 }
