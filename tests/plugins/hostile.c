@@ -27,6 +27,35 @@ static vice_text text(const char *s) {
     return t;
 }
 
+/* With VIOLENT the variable HOSTILE_DO says what happens in which call: `exit@open`. */
+static void violence(const char *place) {
+#if defined(VIOLENT)
+    static const char garbage[] = "garbage garbage garbage garbage ";
+    const char *what = getenv("HOSTILE_DO"), *at = what ? strchr(what, '@') : NULL;
+    long i;
+    if (at == NULL || strcmp(at + 1, place) != 0) return;
+    if (strncmp(what, "exit@", 5) == 0) exit(0);
+    if (strncmp(what, "leave@", 6) == 0) _exit(0);
+    if (strncmp(what, "abort@", 6) == 0) abort();
+    if (strncmp(what, "segv@", 5) == 0) raise(SIGSEGV);
+    if (strncmp(what, "hang@", 5) == 0)
+        for (;;) sleep(1);
+    if (strncmp(what, "log@", 4) == 0)
+        for (i = 0; i < 100000; ++i) the_host->log(the_host->context, VICE_LOG_WARN, text("again and again"));
+    if (strncmp(what, "print@", 6) == 0) {
+        for (i = 0; i < 100000; ++i) puts("again and again");
+        fflush(stdout);
+    }
+    if (strncmp(what, "take@", 5) == 0)
+        for (;;) memset(malloc(64 << 20), 1, 64 << 20);
+    if (strncmp(what, "garbage@", 8) == 0)
+        for (i = 3; i < 64; ++i)
+            if (write((int)i, garbage, sizeof garbage) < 0) continue;
+#else
+    (void)place;
+#endif
+}
+
 /* Calls must not overlap, since this plugin does not say that it is thread-safe. */
 static int busy;
 static void enter(void) {
@@ -80,6 +109,7 @@ static int is_there(vice_text folder) {
 
 static int32_t probe(vice_text path, vice_probe *out, vice_message *message) {
     (void)message;
+    violence("probe");
     out->answer = is_there(path) ? VICE_PROBE_YES : VICE_PROBE_NO;
 #if defined(CLAIMS_ALL)
     out->answer = VICE_PROBE_YES;
@@ -96,6 +126,7 @@ static int32_t open_dataset(vice_text path, const vice_setting *settings, size_t
     char line[4200];
     (void)settings;
     (void)count;
+    violence("open");
 #if defined(ABORTS)
     abort();
 #elif defined(LEAKS)
@@ -126,6 +157,7 @@ static int32_t describe(void *dataset, vice_dataset_info *out, vice_message *mes
     static vice_stream_entry streams[3];
     (void)dataset;
     (void)message;
+    violence("describe");
     cameras[0].name = text("cam");
     cameras[0].flags = VICE_CAMERA_HAS_DEPTH;
     streams[0].name = text("ground-truth");
@@ -160,6 +192,7 @@ static int32_t describe(void *dataset, vice_dataset_info *out, vice_message *mes
 
 static int32_t camera(void *dataset, size_t index, vice_camera *out, vice_message *message) {
     (void)dataset;
+    violence("camera");
     if (index != 0) return fail(message, "there is no such camera");
     out->width_px = WIDTH;
     out->height_px = HEIGHT;
@@ -184,6 +217,7 @@ static int32_t frames(void *dataset, size_t index, vice_stamps *out, vice_messag
     int64_t *stamps;
     size_t i;
     (void)dataset;
+    violence("frames");
     if (index != 0) return fail(message, "there is no such camera");
     stamps = malloc(FRAMES * sizeof *stamps);
     for (i = 0; i < FRAMES; ++i) stamps[i] = stamp(i);
@@ -204,6 +238,7 @@ static int32_t frames(void *dataset, size_t index, vice_stamps *out, vice_messag
 
 static int32_t image(void *dataset, size_t index, size_t frame, vice_image *out, vice_message *message) {
     (void)dataset;
+    violence("image");
 #if defined(CRASHES)
     raise(SIGSEGV);
 #elif defined(HANGS)
@@ -248,6 +283,7 @@ static int32_t image(void *dataset, size_t index, size_t frame, vice_image *out,
 static int32_t body_from_camera(void *dataset, size_t index, int64_t at, vice_rigid *out, vice_message *message) {
     (void)dataset;
     (void)at;
+    violence("body_from_camera");
     if (index != 0) return fail(message, "there is no such camera");
     out->rotation_wxyz[1] = 1;
 #if defined(NOT_UNIT)
@@ -260,6 +296,7 @@ static int32_t trajectory(void *dataset, size_t index, vice_poses *out, vice_mes
     vice_pose *poses;
     size_t i;
     (void)dataset;
+    violence("trajectory");
     if (index != 0 && index != 2) return fail(message, "there is no such stream");
     poses = calloc(FRAMES, sizeof *poses);
     for (i = 0; i < FRAMES; ++i) {
@@ -290,6 +327,7 @@ VICE_EXPORT const vice_plugin_table *another_symbol(const vice_host *host);
 const vice_plugin_table *vice_plugin(const vice_host *host) {
     static vice_plugin_table table;
     the_host = host;
+    violence("load");
     table.abi_version = VICE_ABI_VERSION;
     table.struct_size = sizeof table;
     table.name = text(NAME);

@@ -5,7 +5,9 @@
 #![allow(clippy::expect_used, clippy::panic, clippy::print_stderr)] // A test helper fails its test.
 
 pub mod flawed;
+pub mod fuzzing;
 pub mod layouts;
+pub mod measured;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

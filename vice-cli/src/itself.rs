@@ -23,6 +23,11 @@ impl Itself {
         Self { words: std::iter::once(program.into()).chain(leading).collect() }
     }
 
+    /// The words that start it, without arguments.
+    pub(crate) fn words(&self) -> Vec<OsString> {
+        self.words.clone()
+    }
+
     /// Adds the arguments.
     pub(crate) fn with(mut self, args: impl IntoIterator<Item = OsString>) -> Self {
         self.words.extend(args);

@@ -19,7 +19,9 @@ use clap::{CommandFactory, Parser};
 use arguments::{Cli, Command};
 pub use itself::Itself;
 use terminal::Outcome;
+use vice_run::core::budget::Budget;
 use vice_run::core::instructions::Instructions;
+use vice_run::host::isolated;
 
 /// Names of the program's commands, in the order of its help.
 pub fn commands() -> Vec<String> {
@@ -31,12 +33,20 @@ pub fn command_line() -> clap::Command {
     Cli::command()
 }
 
+/// The command that serves a plugin in a process of its own, as talkative as this one.
+fn serving(mut words: Vec<OsString>, cli: &Cli) -> Vec<OsString> {
+    words.extend((0..cli.verbose).map(|_| OsString::from("-v")));
+    words.extend(["plugin", "serve"].map(OsString::from));
+    words
+}
+
 /// Runs the program with the arguments of a command line, the first of which is its own name. Returns the exit code.
 ///
 /// `itself` says how the program is started once more, for the commands that need a process of their own. What a command
 /// prints goes to the standard output and error of this process.
 pub fn main_from(args: impl IntoIterator<Item = OsString>, itself: Itself) -> u8 {
     let args: Vec<OsString> = args.into_iter().collect();
+    let bare = itself.words();
     let itself = itself.with(args.iter().skip(1).cloned());
     let cli = match Cli::try_parse_from(args) {
         Ok(cli) => cli,
@@ -44,11 +54,14 @@ pub fn main_from(args: impl IntoIterator<Item = OsString>, itself: Itself) -> u8
     };
     let verbosity = terminal::Verbosity::new(cli.quiet, cli.verbose);
     terminal::show_warnings(verbosity);
-    if let Err(wrong) = Instructions::from_environment() {
+    let settings =
+        Instructions::from_environment().map(drop).and_then(|()| Budget::from_environment().map(drop));
+    if let Err(wrong) = settings {
         let error = terminal::usage(wrong);
         terminal::print_error(&error);
         return terminal::exit_code(&error);
     }
+    isolated::program_is(serving(bare, &cli));
     // The annotator ends by itself, with all labels saved.
     if !matches!(cli.command, Command::Annotate(_)) {
         signals::listen();

@@ -16,6 +16,7 @@
 
 pub use nalgebra;
 
+pub mod budget;
 pub mod camera;
 pub mod check;
 pub mod conventions;

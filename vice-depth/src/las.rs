@@ -4,7 +4,7 @@
 //! handed on in double precision.
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use las::{PointDataBuilder, Reader};
@@ -16,7 +16,11 @@ use crate::ply::PointSink;
 const PIECE_POINTS: u64 = 1 << 16;
 
 /// Reads the points of a file that is `length` bytes long.
-pub(crate) fn read_points(file: File, length: Option<u64>, sink: &mut impl PointSink) -> DataResult<()> {
+pub(crate) fn read_points(mut file: File, length: Option<u64>, sink: &mut impl PointSink) -> DataResult<()> {
+    if let Some(length) = length {
+        check_records(&mut file, length)?;
+        check_chunks(&mut file, length)?;
+    }
     let mut reader = checked("the header", || Reader::new(BufReader::new(file)))?;
     let header = reader.header();
     let promised = header.number_of_points();
@@ -45,6 +49,103 @@ pub(crate) fn read_points(file: File, length: Option<u64>, sink: &mut impl Point
         found += got;
     }
     Ok(())
+}
+
+/// Holds the numbers of points and records that a header announces against the length of the file: the decoder multiplies
+/// them as they are. What is no header is for the decoder to refuse.
+fn check_records(file: &mut File, length: u64) -> DataResult<()> {
+    /// Bytes of a record's own header, before the points and after them.
+    const RECORD: u64 = 54;
+    const EXTENDED_RECORD: u64 = 60;
+    let mut header = Vec::new();
+    let failed = |e: std::io::Error| DataError::new("cannot be read").because(e);
+    file.by_ref().take(375).read_to_end(&mut header).map_err(failed)?;
+    file.rewind().map_err(failed)?;
+    let bytes = |at: usize, count: usize| {
+        let mut word = [0; 8];
+        word[..count].copy_from_slice(header.get(at..at + count)?);
+        Some(u64::from_le_bytes(word))
+    };
+    let is_compressed = bytes(104, 1).is_none_or(|format| format & 0x80 != 0);
+    let large = bytes(25, 1).is_some_and(|minor| minor >= 4);
+    let size = if is_compressed { 0 } else { bytes(105, 2).unwrap_or(0) };
+    let mut promised = vec![("points", bytes(107, 4), size), ("records", bytes(100, 4), RECORD)];
+    if large {
+        promised.push(("points", bytes(247, 8), size));
+        promised.push(("records after the points", bytes(243, 4), EXTENDED_RECORD));
+    }
+    for (what, count, each) in promised {
+        let count = count.unwrap_or(0);
+        // No laser has measured so many points, whatever they are packed to.
+        if count.saturating_mul(each) > length || count > 1 << 40 {
+            return Err(DataError::new(format!(
+                "the header promises {count} {what}, in a file of {length} bytes"
+            ))
+            .hint("the file is cut off, or no LAS file"));
+        }
+    }
+    if large {
+        let (start, count) = (bytes(235, 8).unwrap_or(0), bytes(243, 4).unwrap_or(0));
+        check_extended(file, start, count, length)?;
+        file.rewind().map_err(failed)?;
+    }
+    Ok(())
+}
+
+/// Holds the length of each record after the points against what is left of the file.
+fn check_extended(file: &mut File, mut at: u64, count: u64, length: u64) -> DataResult<()> {
+    for _ in 0..count {
+        let mut head = [0; 60];
+        if file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(&mut head)).is_err() {
+            return Err(DataError::new("a record after the points is cut off").byte(at));
+        }
+        // After two reserved bytes, the name of its user and its number.
+        let mut size = [0; 8];
+        size.copy_from_slice(&head[20..28]);
+        let size = u64::from_le_bytes(size);
+        if size > length.saturating_sub(at + 60) {
+            let problem = format!("a record after the points claims {size} bytes, in a file of {length}");
+            return Err(DataError::new(problem).byte(at));
+        }
+        at += 60 + size;
+    }
+    Ok(())
+}
+
+/// Holds the number of chunks of a LAZ file against its length: the decoder takes memory for as many as the file says, and a
+/// process that asks for more than there is cannot be stopped from ending. What cannot be found is for the decoder to miss.
+fn check_chunks(file: &mut File, length: u64) -> DataResult<()> {
+    /// Where the header says at which byte the points start, and the format of a point, whose highest bit is that of LAZ.
+    const POINTS_AT: u64 = 96;
+    const FORMAT_AT: u64 = 104;
+    let mut bytes =
+        |at: u64, into: &mut [u8]| file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(into));
+    let mut chunks = || -> std::io::Result<Option<(u64, u32)>> {
+        let (mut long, mut short, mut format) = ([0; 8], [0; 4], [0]);
+        bytes(FORMAT_AT, &mut format)?;
+        if format[0] & 0x80 == 0 {
+            return Ok(None);
+        }
+        bytes(POINTS_AT, &mut short)?;
+        bytes(u64::from(u32::from_le_bytes(short)), &mut long)?;
+        if i64::from_le_bytes(long) == -1 {
+            // Written without going back: the place stands at the end.
+            bytes(length.saturating_sub(8), &mut long)?;
+        }
+        let table = u64::from_le_bytes(long);
+        // After the version of the table.
+        bytes(table.saturating_add(4), &mut short)?;
+        Ok(Some((table, u32::from_le_bytes(short))))
+    };
+    let found = chunks().ok().flatten();
+    file.rewind().map_err(|e| DataError::new("cannot be read").because(e))?;
+    match found {
+        Some((table, chunks)) if u64::from(chunks) > length => {
+            Err(DataError::new(format!("{chunks} chunks are announced in a file of {length} bytes"))
+                .byte(table))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// What the decoder makes; bytes that are none of a compressed file may bring it to stop in its own code.
@@ -94,6 +195,20 @@ mod tests {
             assert!((z - 316.0).abs() < 1e-6, "{name}: {z}");
             assert!(scan.suspicions.is_empty(), "{name}");
         }
+    }
+
+    #[test]
+    fn a_table_of_chunks_is_counted_against_the_file() {
+        let (_folder, path) = file("scan.laz", 5000);
+        let mut bytes = std::fs::read(&path).unwrap();
+        let word =
+            |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+        let points = word(&bytes, 96);
+        let table = word(&bytes, points);
+        bytes[table + 4..table + 8].copy_from_slice(&u32::MAX.to_le_bytes());
+        std::fs::write(&path, &bytes).unwrap();
+        let error = read_scan_points(&path, &CloudOptions::default()).map(|s| s.points.len()).unwrap_err();
+        assert!(error.to_string().contains("4294967295 chunks are announced in a file of"), "{error}");
     }
 
     #[test]

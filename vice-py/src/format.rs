@@ -195,7 +195,11 @@ pub(crate) fn formats(
     plugins: Vec<PathBuf>,
     allow_writable_plugin: bool,
 ) -> Answer<Vec<Py<PyDict>>> {
-    let spec = vice_run::request::PluginsSpec { files: plugins, allow_writable: allow_writable_plugin };
+    let spec = vice_run::request::PluginsSpec {
+        files: plugins,
+        allow_writable: allow_writable_plugin,
+        isolate: None,
+    };
     let formats = long(py, None, move |_| vice_run::formats::Formats::load(&spec))?;
     let of = |format: FormatInfo| -> PyResult<Py<PyDict>> {
         let values = PyDict::new(py);

@@ -52,7 +52,7 @@ pub(crate) fn open_path(
     plugins: Vec<PathBuf>,
     allow_writable_plugin: bool,
 ) -> Answer<Recording> {
-    let plugins = PluginsSpec { files: plugins, allow_writable: allow_writable_plugin };
+    let plugins = PluginsSpec { files: plugins, allow_writable: allow_writable_plugin, isolate: None };
     let spec = DatasetSpec { path, format, set: settings, plugins, ..DatasetSpec::default() };
     let asked = spec.clone();
     let dataset = long(py, None, move |_| asked.open_raw(&formats::registry(&asked.plugins)?))?;

@@ -10,7 +10,7 @@ use vice_core::frames::BodyFromCamera;
 use vice_core::imu::{ImuSample, InertialState};
 use vice_core::suspicion::Suspicion;
 use vice_core::time::Stamp;
-use vice_core::trajectory::Trajectory;
+use vice_core::trajectory::{PoseCovariance, Trajectory};
 
 use crate::place::Place;
 
@@ -59,6 +59,10 @@ impl Dataset for Away {
 
     fn trajectory(&self, stream: &str) -> DataResult<Trajectory> {
         self.place.told(self.inner.trajectory(stream))
+    }
+
+    fn pose_covariances(&self, stream: &str) -> DataResult<Vec<PoseCovariance>> {
+        self.inner.pose_covariances(stream)
     }
 
     fn is_relative(&self, stream: &str) -> bool {

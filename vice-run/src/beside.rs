@@ -239,6 +239,13 @@ impl Dataset for Beside {
         })
     }
 
+    fn pose_covariances(&self, stream: &str) -> DataResult<Vec<PoseCovariance>> {
+        match self.streams.contains_key(stream) {
+            true => Ok(Vec::new()),
+            false => self.inner.pose_covariances(stream),
+        }
+    }
+
     fn is_relative(&self, stream: &str) -> bool {
         !self.streams.contains_key(stream) && self.inner.is_relative(stream)
     }

@@ -1,19 +1,79 @@
 //! The formats that are known: those built in, and those of plugins.
 
+use std::path::Path;
 use std::sync::OnceLock;
 
-use vice_core::dataset::DatasetFactory;
-use vice_core::error::one_line;
+use vice_core::dataset::{DatasetFactory, FormatInfo};
+use vice_core::error::{DataResult, one_line};
 use vice_core::registry::Registry;
+use vice_host::isolated::{self, IsolatedPlugin, isolated_by_default};
 use vice_host::{LoadOptions, Plugin, search};
 
 use crate::error::{RunError, RunResult};
 use crate::request::PluginsSpec;
 
+/// A library that is loaded, in this process or in one of its own.
+#[derive(Clone)]
+pub enum Loaded {
+    /// In this process.
+    Here(Plugin),
+    /// In processes of its own.
+    Isolated(IsolatedPlugin),
+}
+
+impl Loaded {
+    /// Loads a library where the request, or else the place of the library, says.
+    fn load(file: &Path, plugins: &PluginsSpec) -> DataResult<Self> {
+        let options = LoadOptions { allow_writable: plugins.allow_writable };
+        // Who uses VICE as a library may have no program that serves plugins.
+        let apart = plugins.isolate.unwrap_or_else(|| isolated::can_isolate() && isolated_by_default(file));
+        match apart {
+            true => IsolatedPlugin::load(file, &options).map(Self::Isolated),
+            false => Plugin::load(file, &options).map(Self::Here),
+        }
+    }
+
+    /// What the format is.
+    pub fn info(&self) -> &FormatInfo {
+        match self {
+            Self::Here(plugin) => plugin.info(),
+            Self::Isolated(plugin) => plugin.info(),
+        }
+    }
+
+    /// Where the library is, without links.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Here(plugin) => plugin.path(),
+            Self::Isolated(plugin) => plugin.path(),
+        }
+    }
+
+    /// Whether its table is that of this program's contract in full, or an older and shorter one.
+    pub fn complete_table(&self) -> bool {
+        match self {
+            Self::Here(plugin) => plugin.complete_table(),
+            Self::Isolated(plugin) => plugin.complete_table(),
+        }
+    }
+
+    /// Whether it runs in processes of its own.
+    pub const fn is_isolated(&self) -> bool {
+        matches!(self, Self::Isolated(_))
+    }
+
+    fn factory(&self) -> Box<dyn DatasetFactory> {
+        match self {
+            Self::Here(plugin) => Box::new(plugin.clone()),
+            Self::Isolated(plugin) => Box::new(plugin.clone()),
+        }
+    }
+}
+
 /// A format that came with a library.
 pub struct LoadedPlugin {
     /// The library.
-    pub plugin: Plugin,
+    pub plugin: Loaded,
     /// Whether it took the place of a built-in format.
     pub replaces: bool,
 }
@@ -68,15 +128,14 @@ impl Formats {
     /// # Errors
     /// [`RunError`] if a named one does not load, or two named ones read the same format.
     pub fn load(plugins: &PluginsSpec) -> RunResult<Self> {
-        let options = LoadOptions { allow_writable: plugins.allow_writable };
         let mut formats = Self { registry: built_in(), plugins: Vec::new(), left_out: Vec::new() };
         for file in &plugins.files {
-            formats.named(Plugin::load(file, &options)?)?;
+            formats.named(Loaded::load(file, plugins)?)?;
         }
         let found = search::find();
         formats.left_out.extend(found.remarks);
         for file in found.libraries {
-            match Plugin::load(&file, &options) {
+            match Loaded::load(&file, plugins) {
                 Ok(plugin) => formats.found(plugin),
                 Err(error) => formats.left_out.push(format!("plugin {}", one_line(&error))),
             }
@@ -98,7 +157,7 @@ impl Formats {
     }
 
     /// One that the user named goes before what is built in, but two of them must not compete.
-    fn named(&mut self, plugin: Plugin) -> RunResult<()> {
+    fn named(&mut self, plugin: Loaded) -> RunResult<()> {
         let name = plugin.info().name.clone();
         match self.plugins.iter().find(|p| p.plugin.info().name == name) {
             Some(same) if same.plugin.path() == plugin.path() => Ok(()),
@@ -118,7 +177,7 @@ impl Formats {
     }
 
     /// One that was found takes no other's place.
-    fn found(&mut self, plugin: Plugin) {
+    fn found(&mut self, plugin: Loaded) {
         let name = plugin.info().name.clone();
         let path = plugin.path().display().to_string();
         match self.plugins.iter().find(|p| p.plugin.info().name == name) {
@@ -134,9 +193,9 @@ impl Formats {
         }
     }
 
-    fn add(&mut self, plugin: Plugin) {
+    fn add(&mut self, plugin: Loaded) {
         let replaces = self.registry.by_name(&plugin.info().name).is_ok();
-        self.registry.add(Box::new(plugin.clone()));
+        self.registry.add(plugin.factory());
         self.plugins.push(LoadedPlugin { plugin, replaces });
     }
 }

@@ -319,10 +319,8 @@ mod tests {
         assert!(request.of_each_camera().unwrap().is_none());
         request.dataset.camera = Some("cam0, cam1".to_string());
         let each = request.of_each_camera().unwrap().unwrap();
-        let told: Vec<String> = each
-            .iter()
-            .map(|r| format!("{:?} {}", r.dataset.camera, r.labels.file.display()))
-            .collect();
+        let told: Vec<String> =
+            each.iter().map(|r| format!("{:?} {}", r.dataset.camera, r.labels.file.display())).collect();
         assert_eq!(told, ["Some(\"cam0\") l_cam0.csv", "Some(\"cam1\") l_cam1.csv"]);
         for wrong in ["cam0,cam0", "cam0,", ",cam1"] {
             request.dataset.camera = Some(wrong.to_string());

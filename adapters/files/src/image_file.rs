@@ -1,15 +1,17 @@
 //! PNG and JPEG to pixels and back, with limits that are set before anything is decoded.
 
-use std::fs;
-use std::io::{self, Cursor};
+use std::fs::{self, File};
+use std::io::{self, Cursor, Read};
 use std::path::Path;
 
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::imageops::FilterType as Resampling;
 use image::{
-    DynamicImage, ExtendedColorType, GrayImage, ImageDecoder, ImageEncoder, ImageReader, Limits, RgbImage,
+    DynamicImage, ExtendedColorType, GrayImage, ImageDecoder, ImageEncoder, ImageFormat, ImageReader, Limits,
+    RgbImage,
 };
+use vice_core::budget::Budget;
 use vice_core::dataset::{DepthImage, Image, PixelFormat};
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::time::Stamp;
@@ -22,8 +24,12 @@ pub const MAX_SIDE_PX: u32 = 32_768;
 const MAX_DECODED_BYTES: u64 = 1 << 30;
 /// Bytes of pixels that any file may claim, however small it is: 32 million coloured pixels.
 const FREE_DECODED_BYTES: u64 = 96 << 20;
+/// The same of a JPEG: one that is stored in several passes takes three times as much while it is decoded.
+const FREE_JPEG_BYTES: u64 = 48 << 20;
 /// Bytes of pixels for each byte of a larger file. Pictures of a camera are packed 2 to 30 times; only a bomb needs more.
 const MAX_PACKING: u64 = 64;
+/// Bytes beyond which a file is no picture of a camera: it is not even read.
+const MAX_FILE_BYTES: u64 = 160 << 20;
 
 /// Decodes a PNG or JPEG: gray stays gray, 16 bits a channel become 8 (the full range scaled), alpha is dropped.
 ///
@@ -49,7 +55,7 @@ pub fn decode(bytes: &[u8]) -> DataResult<Image> {
 /// [`DataError`] with the path, as [`decode`], or if the file cannot be read.
 pub fn read(path: impl AsRef<Path>) -> DataResult<Image> {
     let path = path.as_ref();
-    decode(&read_bytes(path)?).map_err(|e| e.at(path))
+    decode(&read_picture(path)?).map_err(|e| e.at(path))
 }
 
 /// Decodes a 16 bit gray PNG of counts, each worth `metres_per_count`; 0 is no depth.
@@ -176,6 +182,20 @@ pub fn read_bytes(path: impl AsRef<Path>) -> DataResult<Vec<u8>> {
     }
 }
 
+/// The bytes of a file that should be a picture, however large it says it is: files may have holes.
+fn read_picture(path: &Path) -> DataResult<Vec<u8>> {
+    if let Some(bytes) = elsewhere::read(path)? {
+        return Ok(bytes);
+    }
+    let file = File::open(path).map_err(|e| unreadable(path, e))?;
+    let size = file.metadata().map_err(|e| unreadable(path, e))?.len();
+    let budget = Budget::in_use();
+    budget.check(size, "bytes of a picture", MAX_FILE_BYTES).map_err(|e| e.at(path))?;
+    let mut bytes = Vec::new();
+    file.take(budget.most(MAX_FILE_BYTES)).read_to_end(&mut bytes).map_err(|e| unreadable(path, e))?;
+    Ok(bytes)
+}
+
 fn encode(bytes: &[u8], width: u32, height: u32, colour: ExtendedColorType) -> DataResult<Vec<u8>> {
     let mut png = Vec::new();
     PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Up)
@@ -188,22 +208,25 @@ fn decode_dynamic(bytes: &[u8]) -> DataResult<DynamicImage> {
     let mut reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
         .map_err(|e| DataError::new("the image cannot be read").because(e))?;
+    let budget = Budget::in_use();
     let mut limits = Limits::no_limits();
     limits.max_image_width = Some(MAX_SIDE_PX);
     limits.max_image_height = Some(MAX_SIDE_PX);
-    limits.max_alloc = Some(MAX_DECODED_BYTES);
+    limits.max_alloc = Some(budget.most(MAX_DECODED_BYTES));
+    let is_jpeg = reader.format() == Some(ImageFormat::Jpeg);
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(not_an_image)?;
     let claimed = decoder.total_bytes();
-    if claimed > FREE_DECODED_BYTES.max(MAX_PACKING.saturating_mul(bytes.len() as u64)).min(MAX_DECODED_BYTES)
-    {
+    let free = if is_jpeg { FREE_JPEG_BYTES } else { FREE_DECODED_BYTES };
+    let usual = free.max(MAX_PACKING.saturating_mul(bytes.len() as u64)).min(MAX_DECODED_BYTES);
+    if claimed > budget.most(usual) {
         let (width, height) = decoder.dimensions();
         return Err(DataError::new(format!(
             "claims {width}x{height} pixels ({} MB) in {} kB: no camera's picture is packed like that, it is not decoded",
             claimed >> 20,
             bytes.len() >> 10
         ))
-        .hint("is the file damaged?"));
+        .hint(format!("is the file damaged? Where it is right, {}", Budget::raised(claimed, usual))));
     }
     DynamicImage::from_decoder(decoder).map_err(not_an_image)
 }

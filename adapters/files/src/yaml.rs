@@ -9,6 +9,8 @@ use vice_core::error::{DataError, DataResult, ErrorKind};
 
 /// Bytes beyond which a description file is refused.
 const MAX_BYTES: u64 = 4 << 20;
+/// Values that aliases may repeat: a description says little twice, a bomb says everything again and again.
+const MAX_REPEATED: usize = 100_000;
 
 /// Reads a YAML file.
 ///
@@ -28,7 +30,9 @@ pub fn parse<T: DeserializeOwned>(text: &str) -> DataResult<T> {
     // Made comments or blanks, not cut out, so that lines keep their numbers. `%YAML:1.0` is no directive of YAML.
     let text = if text.starts_with("%YAML") { format!("#{text}") } else { text.to_string() };
     let text = text.replace("!!opencv-matrix", "                ");
-    serde_saphyr::from_str(&text).map_err(|e| {
+    let mut options = serde_saphyr::Options::default();
+    options.alias_limits.max_total_replayed_events = MAX_REPEATED;
+    serde_saphyr::from_str_with_options(&text, options).map_err(|e| {
         let error = DataError::new(format!("is not the YAML expected: {}", first_line(&e.to_string())));
         match e.location() {
             Some(at) if at.line() > 0 => error.line(at.line()),

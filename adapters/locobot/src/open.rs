@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
+use vice_core::budget::BUDGET;
 use vice_core::dataset::OpenOptions;
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::statistics::middle;
@@ -268,7 +269,10 @@ fn check_use(topics: &[Topic], path: &Path, doubts: &Doubts) -> DataResult<()> {
         ),
     };
     let error = DataError::of_kind(ErrorKind::Unsupported, problem).at(path);
-    Err(match doubts.damage().into_iter().next() {
+    // A file that was refused for what it claims is of more use said than one that was not closed.
+    let damage = doubts.damage();
+    let reason = damage.iter().find(|line| line.contains(BUDGET)).or(damage.first()).cloned();
+    Err(match reason {
         Some(first) => error.because(DataError::new(first)),
         None if names.is_empty() => error,
         None => error.hint(format!("its topics: {}", list(&names))),

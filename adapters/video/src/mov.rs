@@ -8,14 +8,14 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
+use vice_core::budget::Budget;
 use vice_core::error::{DataError, DataResult};
 use vice_files::elsewhere::{self, Reader};
 
-/// Bytes of `moov` beyond which a film is refused; a day at 120 frames a second needs about 200 MB.
-const MAX_INDEX_BYTES: u64 = 512 << 20;
-
-/// Frames beyond which a film is refused: a day at 120 frames a second has fewer.
-const MAX_FRAMES: u64 = 12_000_000;
+/// Bytes of `moov` beyond which a film is refused; nine hours at 120 frames a second need about 80 MB.
+const MAX_INDEX_BYTES: u64 = 96 << 20;
+/// Frames beyond which a film is refused: nine hours at 120 frames a second.
+const MAX_FRAMES: u64 = 4_000_000;
 /// Pixels that a byte of a frame can stand for where all frames have one size: such films are not compressed, or little.
 const MAX_PIXELS_PER_BYTE: u64 = 256;
 
@@ -106,8 +106,8 @@ fn find_index(file: &mut (impl Read + Seek), length: u64) -> std::io::Result<Dat
             return Ok(Err(DataError::new("is a fragmented film, whose frames have no index").hint(REMUX)));
         }
         if &kind == b"moov" && moov.is_none() {
-            if size > MAX_INDEX_BYTES {
-                return Ok(Err(DataError::new(format!("an index of {size} bytes is too large")).byte(at)));
+            if let Err(error) = Budget::in_use().check(size, "bytes of an index", MAX_INDEX_BYTES) {
+                return Ok(Err(error.byte(at)));
             }
             // The size is within the file, so memory is taken for what is there.
             let mut content = vec![0; (size - header) as usize];
@@ -163,12 +163,7 @@ fn parse_index(moov: &[u8], file_length: u64) -> DataResult<MovIndex> {
         return Err(DataError::new(format!("its index promises {count} frames, there is room for {room}")));
     }
     // Empty room is cheap: a file may be sparse. So what is promised must be a film that somebody could have taken.
-    if count as u64 > MAX_FRAMES {
-        return Err(DataError::new(format!(
-            "its index promises {count} frames; more than {MAX_FRAMES} are not read"
-        ))
-        .hint("cut the film into parts"));
-    }
+    Budget::in_use().check(count as u64, "frames that its index promises", MAX_FRAMES)?;
     if each != 0 && u64::from(each) * MAX_PIXELS_PER_BYTE < u64::from(width) * u64::from(height) {
         return Err(DataError::new(format!(
             "its index says that each frame has {each} bytes: too few for {width}x{height} pixels"

@@ -23,8 +23,7 @@ use crate::terminal::{self, Outcome, Verbosity, usage, with_progress};
     vice evaluate V1_01_easy --labels floor.csv --estimate imu-euler,openvins.txt --depth floor,zmap\n  \
     vice evaluate my_run --labels labels.json --estimate rel:odometry.txt --reference none --depth zcam --json out.json\n  \
     vice evaluate my_run --labels auto --estimate odom --depth zcam   (labels without a hand)\n  \
-    vice evaluate my_run --camera cam0,cam1 --labels labels_{camera}.csv --estimate odom   (each camera, and together)
-  \
+    vice evaluate my_run --camera cam0,cam1 --labels labels_{camera}.csv --estimate odom   (each camera, and together)\n  \
     vice evaluate --request out.json   (evaluates again what out.json is the result of)\n\n\
     For several values repeat the option or separate them with commas. Estimates are names of the data set's streams, `imu-euler` (Euler \
     integration of its IMU from the reference state at the first key frame), or files: TUM, EuRoC CSV, KITTI with a \
@@ -115,8 +114,8 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         if samples.is_some() {
             return Err(usage("--samples jsonl is of one camera, and several are asked"));
         }
-        let OutputArgs { json, csv, latex, report, .. } = files;
-        let files = Files { json, csv, latex, report, samples: files.samples != SamplesTo::None };
+        let OutputArgs { json, csv, latex, report, page, .. } = files;
+        let files = Files { json, csv, latex, report, page, samples: files.samples != SamplesTo::None };
         let document = evaluate_rig::run(&request, each, &files, verbosity)?;
         return Ok(judged(&document.cameras, args, verbosity));
     }
@@ -136,6 +135,9 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     let page = match &files.report {
         Some(path) => {
             let run = run_of(document.clone(), &request, &opened, IMAGE_BUDGET_BYTES, &files.page, verbosity);
+            if let Some(problem) = &run.shots.problem {
+                tracing::warn!("{}: {problem}", path.display());
+            }
             Some((path, render(&[run])?))
         }
         None => None,

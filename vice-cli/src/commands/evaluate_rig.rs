@@ -2,11 +2,13 @@
 
 use std::path::PathBuf;
 
+use vice_run::open::Opened;
 use vice_run::report::html::{IMAGE_BUDGET_BYTES, Run, render};
 use vice_run::request::Request;
+use vice_run::result::ResultDocument;
 use vice_run::rig::{Rig, RigDocument};
 
-use super::report::shots;
+use super::report::{PageArgs, run_of};
 use crate::outputs::Outputs;
 use crate::terminal::{self, Verbosity, printable, with_progress};
 
@@ -16,6 +18,7 @@ pub(super) struct Files<'a> {
     pub(super) csv: &'a Option<PathBuf>,
     pub(super) latex: &'a Option<PathBuf>,
     pub(super) report: &'a Option<PathBuf>,
+    pub(super) page: &'a PageArgs,
     /// Whether the document lists the samples.
     pub(super) samples: bool,
 }
@@ -35,9 +38,11 @@ pub(super) fn run(
     let page = match files.report {
         Some(path) => {
             let budget = IMAGE_BUDGET_BYTES / document.cameras.len().max(1);
-            let of_camera = |(one, (_, opened)): (&_, &(Request, vice_run::open::Opened))| {
-                let mut run =
-                    Run::new(Clone::clone(one), shots(one, opened.dataset.as_ref(), budget, verbosity));
+            let of_camera = |(one, (request, opened)): (&ResultDocument, &(Request, Opened))| {
+                let mut run = run_of(one.clone(), request, opened, budget, files.page, verbosity);
+                if let Some(problem) = &run.shots.problem {
+                    tracing::warn!("{}: {problem}", path.display());
+                }
                 run.name = format!("{}: {}", run.name, printable(&opened.camera_name));
                 run
             };

@@ -55,7 +55,8 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
                 let path = shown(&found.plugin.path().display().to_string());
                 let replaces = if found.replaces { ", in place of the one built in" } else { "" };
                 let older = if found.plugin.complete_table() { "" } else { ", made for an older VICE" };
-                writeln!(text, "    from: {path}{replaces}{older}")?;
+                let apart = if found.plugin.is_isolated() { ", in a process of its own" } else { "" };
+                writeln!(text, "    from: {path}{replaces}{older}{apart}")?;
             }
             None => writeln!(text, "    from: built in")?,
         }

@@ -7,6 +7,8 @@ use vice_run::core::time::Stamp;
 use vice_run::formats;
 use vice_run::request::{DatasetSpec, PluginsSpec};
 
+use super::on_off;
+
 /// Which data set, and which camera of it.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Data set")]
@@ -36,6 +38,9 @@ pub(crate) struct PluginArgs {
     /// Load plugins even from files or folders that others may write to.
     #[arg(long)]
     pub(crate) allow_writable_plugin: bool,
+    /// Run plugins in processes of their own, which may crash or hang [default: on for those outside of the home folder].
+    #[arg(long, value_name = "on|off", num_args = 0..=1, require_equals = true, default_missing_value = "on", value_parser = on_off)]
+    pub(crate) isolate_plugins: Option<bool>,
 }
 
 impl DatasetArgs {
@@ -54,7 +59,11 @@ impl DatasetArgs {
 
 impl PluginArgs {
     pub(crate) fn spec(&self) -> PluginsSpec {
-        PluginsSpec { files: self.files.clone(), allow_writable: self.allow_writable_plugin }
+        PluginsSpec {
+            files: self.files.clone(),
+            allow_writable: self.allow_writable_plugin,
+            isolate: self.isolate_plugins,
+        }
     }
 }
 

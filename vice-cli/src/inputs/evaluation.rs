@@ -10,13 +10,14 @@ use vice_run::request::{LabelsSpec, Protocol, Request, Scoring};
 use super::{DatasetArgs, DepthArgs, StreamArgs, positive, span_not_negative, split_list};
 
 /// What a request in a file takes the place of.
-pub(crate) const ASKED: [&str; 39] = [
+pub(crate) const ASKED: [&str; 40] = [
     "path",
     "format",
     "settings",
     "camera",
     "files",
     "allow_writable_plugin",
+    "isolate_plugins",
     "labels",
     "points",
     "observations",

@@ -13,7 +13,7 @@ use super::Check;
 use crate::finding::{Finding, State, short};
 use crate::frames::WorldFromBody;
 use crate::statistics::median;
-use crate::time::{Span, Stamp};
+use crate::time::Span;
 use crate::trajectory::{PoseCovariance, Trajectory};
 
 /// What this check is.
@@ -134,6 +134,7 @@ mod tests {
     use super::*;
     use crate::frames::Rigid;
     use crate::random::SplitMix;
+    use crate::time::Stamp;
     use nalgebra::UnitQuaternion;
 
     /// A random walk in x, y and z beside a circle, whose covariance is said `scale` times too large.

@@ -54,7 +54,9 @@ pub fn moved(camera: &str, before: Option<&Seen>, now: Option<&Seen>) -> Finding
     let (before, now) = match (before, now) {
         (Some(before), Some(now)) => (before, now),
         (None, _) => {
-            return unknown("the earlier recording does not tell how the camera lies in the body".to_string());
+            return unknown(
+                "the earlier recording does not tell how the camera lies in the body".to_string(),
+            );
         }
         (_, None) => {
             return unknown("this recording does not tell how the camera lies in the body".to_string());

@@ -11,7 +11,7 @@ use crate::frames::BodyFromCamera;
 use crate::imu::{ImuSample, InertialState};
 use crate::suspicion::Suspicion;
 use crate::time::Stamp;
-use crate::trajectory::Trajectory;
+use crate::trajectory::{PoseCovariance, Trajectory};
 
 /// A data set whose calibration, floor, cloud or mesh were given by the user. Everything else is as it was, so that nobody
 /// behind it has to ask whether anything was overridden.
@@ -113,6 +113,10 @@ impl Dataset for Calibrated {
 
     fn trajectory(&self, stream: &str) -> DataResult<Trajectory> {
         self.inner.trajectory(stream)
+    }
+
+    fn pose_covariances(&self, stream: &str) -> DataResult<Vec<PoseCovariance>> {
+        self.inner.pose_covariances(stream)
     }
 
     fn is_relative(&self, stream: &str) -> bool {

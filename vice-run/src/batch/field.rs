@@ -53,7 +53,7 @@ enum Kind {
 }
 
 /// Options, where they stand in a request, and what they hold.
-const FIELDS: [(&str, &str, Kind); 40] = [
+const FIELDS: [(&str, &str, Kind); 41] = [
     ("dataset", "dataset.path", Kind::Text),
     ("format", "dataset.format", Kind::Text),
     ("set", "dataset.set", Kind::Settings),
@@ -69,6 +69,7 @@ const FIELDS: [(&str, &str, Kind); 40] = [
     ("floor-plane", "dataset.floor_plane", Kind::Numbers),
     ("plugin", "dataset.plugins.files", Kind::Texts),
     ("allow-writable-plugin", "dataset.plugins.allow_writable", Kind::Switch),
+    ("isolate-plugins", "dataset.plugins.isolate", Kind::Switch),
     ("labels", "labels.file", Kind::Text),
     ("points", "labels.points", Kind::Texts),
     ("observations", "labels.observations", Kind::Text),

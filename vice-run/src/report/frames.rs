@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::result::ResultDocument;
 use vice_core::dataset::{Dataset, Image};
-use vice_core::error::{DataError, DataResult};
+use vice_core::error::{DataError, DataResult, one_line};
 use vice_core::time::Stamp;
 use vice_files::image_file::{encode_jpeg, shrink};
 
@@ -64,9 +64,10 @@ impl Shots {
         let camera = &document.dataset.camera;
         let frames = match dataset.frames(camera) {
             Ok(frames) => frames,
-            Err(error) => return Self::missing(error.to_string()),
+            Err(error) => return Self::missing(one_line(&error)),
         };
         let wanted: Vec<Stamp> = marks.by_interest().into_iter().take(MAX_FRAMES).collect();
+        let (mut failed, mut first) = (0_usize, None);
         let moments = worst_moments(&marks);
         let mut shots = Self { pieces: crops::wanted(&marks), ..Self::default() };
         let mut of_moments: Vec<Option<Shot>> = moments.iter().map(|_| None).collect();
@@ -95,9 +96,13 @@ impl Shots {
                 Ok(())
             });
             if let Err(error) = made {
-                shots.problem.get_or_insert_with(|| error.to_string());
+                failed += 1;
+                first.get_or_insert_with(|| one_line(&error));
             }
         }
+        shots.problem = first.map(|why| {
+            format!("{failed} of {} pictures cannot be shown, the first because: {why}", all.len())
+        });
         shots.keep_within(&wanted, budget_bytes / 2);
         shots.keep_moments(moments.into_iter().zip(of_moments), budget_bytes / 2);
         shots

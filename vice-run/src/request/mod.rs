@@ -137,6 +137,9 @@ pub struct PluginsSpec {
     /// Load plugins even from files or folders that others may write to.
     #[serde(default)]
     pub allow_writable: bool,
+    /// Whether plugins run in processes of their own; by default those outside of the user's own folders do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub isolate: Option<bool>,
 }
 
 impl PluginsSpec {

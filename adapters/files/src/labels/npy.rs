@@ -2,13 +2,17 @@
 
 use std::io::{Cursor, Read};
 
+use vice_core::budget::Budget;
 use vice_core::error::{DataError, DataResult, ErrorKind};
 
 /// What starts an array file, and an archive.
 pub(super) const NPY: &[u8] = b"\x93NUMPY";
 pub(super) const NPZ: &[u8] = b"PK\x03\x04";
 /// Arrays of more numbers are refused before anything is taken for them.
-const MOST_NUMBERS: usize = 1 << 28;
+const MOST_NUMBERS: u64 = 1 << 28;
+/// Bytes that any archive may unpack to, and how many times its size a larger one may: places of points do not repeat.
+const FREE_BYTES: u64 = 32 << 20;
+const MOST_TIMES: u64 = 8;
 
 /// An array, the last index running fastest.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,21 +29,35 @@ pub(super) struct Array {
 /// [`DataError`] if the bytes are neither, or an array is of a type that is not read.
 pub(super) fn read(bytes: &[u8]) -> DataResult<Vec<(String, Array)>> {
     if bytes.starts_with(NPY) {
-        return Ok(vec![(String::new(), array(bytes)?)]);
+        return Ok(vec![(String::new(), array(bytes, Budget::in_use().most(8 * bytes.len() as u64))?)]);
     }
     let broken = |e: zip::result::ZipError| DataError::new("the archive cannot be read").because(e);
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(broken)?;
     let mut arrays = Vec::new();
+    let budget = Budget::in_use();
+    let usual = FREE_BYTES.max(MOST_TIMES.saturating_mul(bytes.len() as u64));
+    let mut left = budget.most(usual);
     for index in 0..archive.len() {
         let mut entry = archive.by_index(index).map_err(broken)?;
         let name = entry.name().map_err(broken)?.into_owned();
         let Some(name) = name.strip_suffix(".npy").map(str::to_string) else { continue };
         let mut content = Vec::new();
-        let most = 8 * MOST_NUMBERS as u64 + (1 << 16);
-        let read = entry.by_ref().take(most).read_to_end(&mut content);
+        // What the directory says of its size is not believed.
+        let read = entry.by_ref().take(left + 1).read_to_end(&mut content);
         read.map_err(|e| DataError::new(format!("the array `{name}` cannot be unpacked")).because(e))?;
-        match array(&content) {
-            Ok(array) => arrays.push((name, array)),
+        left = left.checked_sub(content.len() as u64).ok_or_else(|| {
+            let claimed = budget.most(usual).max(entry.size());
+            DataError::new(format!(
+                "the archive unpacks to more than the budget of {} bytes",
+                budget.most(usual)
+            ))
+            .hint(format!("where it is right, {}", Budget::raised(claimed, usual)))
+        })?;
+        match array(&content, left) {
+            Ok(array) => {
+                left = left.saturating_sub(8 * array.values.len() as u64);
+                arrays.push((name, array));
+            }
             // Others may stand beside those that are looked for.
             Err(error) if error.kind() == ErrorKind::Unsupported => {}
             Err(error) => return Err(DataError::new(format!("the array `{name}`: {error}"))),
@@ -48,7 +66,8 @@ pub(super) fn read(bytes: &[u8]) -> DataResult<Vec<(String, Array)>> {
     Ok(arrays)
 }
 
-fn array(bytes: &[u8]) -> DataResult<Array> {
+/// The array of some bytes, whose numbers may take so many as doubles.
+fn array(bytes: &[u8], most_bytes: u64) -> DataResult<Array> {
     let broken = || DataError::new("is no array of NumPy, or the file is cut off");
     let version = *bytes.get(6).filter(|_| bytes.starts_with(NPY)).ok_or_else(broken)?;
     let (start, length): (usize, usize) = match version {
@@ -78,9 +97,12 @@ fn array(bytes: &[u8]) -> DataResult<Array> {
         .filter(|s| !s.is_empty())
         .map(|s| s.parse().map_err(|_| broken()))
         .collect::<DataResult<_>>()?;
-    let count = shape.iter().try_fold(1_usize, |n, size| n.checked_mul(*size)).filter(|n| *n <= MOST_NUMBERS);
-    let count =
-        count.ok_or_else(|| DataError::new(format!("an array of the shape {shape:?} is too large")))?;
+    // An empty side makes an array of none, whatever its other sides are: they are counted as well.
+    let count = shape.iter().try_fold(1_usize, |n, size| n.checked_mul((*size).max(1)));
+    let numbers = count.map_or(u64::MAX, |n| n as u64);
+    let what = format!("numbers in an array of the shape {shape:?}");
+    Budget::in_use().check(numbers, &what, MOST_NUMBERS)?;
+    let count: usize = shape.iter().product();
     let data = &bytes[start + length..];
     let unsupported = || {
         DataError::of_kind(ErrorKind::Unsupported, format!("arrays of the type `{code}` are not read"))
@@ -97,6 +119,13 @@ fn array(bytes: &[u8]) -> DataResult<Array> {
         return Err(unsupported());
     }
     let data = data.get(..count * size).ok_or_else(broken)?;
+    if 8 * count as u64 > most_bytes {
+        let hint = format!("where it is right, {}", Budget::raised(8 * count as u64, most_bytes));
+        return Err(DataError::new(format!(
+            "its {count} numbers take more than the budget of {most_bytes} bytes"
+        ))
+        .hint(hint));
+    }
     let values =
         data.chunks_exact(size).map(|b| number(kind, b)).collect::<Option<Vec<f64>>>().ok_or_else(broken)?;
     let values = if fortran { turned(&shape, &values) } else { values };

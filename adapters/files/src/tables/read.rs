@@ -1,5 +1,6 @@
 //! Reading flat Parquet files, whoever wrote them.
 
+use std::cell::Cell;
 use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -8,7 +9,9 @@ use std::sync::Arc;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, DataType};
 use parquet::errors::ParquetError;
+use parquet::file::metadata::ParquetMetaData;
 use parquet::file::reader::{FileReader, SerializedFileReader};
+use vice_core::budget::Budget;
 use vice_core::error::{DataError, DataResult, ErrorKind};
 
 use super::{Column, Values};
@@ -30,6 +33,10 @@ pub fn read(path: &Path) -> DataResult<Vec<Column>> {
     let broken = || DataError::of_kind(ErrorKind::Corrupt, "is no Parquet file, or a damaged one").at(path);
     match found {
         Ok(Ok(columns)) => Ok(columns),
+        Ok(Err(ParquetError::External(error))) => match error.downcast::<DataError>() {
+            Ok(error) => Err(error.at(path)),
+            Err(error) => Err(broken().because(error)),
+        },
         Ok(Err(error)) => Err(broken().because(error)),
         Err(_) => Err(broken()),
     }
@@ -57,18 +64,24 @@ fn columns(file: File) -> Result<Vec<Column>, ParquetError> {
         };
         columns.push((described.name().to_string(), none));
     }
+    check_counts(metadata, bytes)?;
+    let budget = Budget::in_use();
+    let usual_text = FREE_TEXT_BYTES.max(bytes.saturating_mul(MOST_TEXT_TIMES));
+    let text_bytes = Cell::new(0_u64);
+    let text = |b: &ByteArray| {
+        text_bytes.set(text_bytes.get() + b.len() as u64);
+        // What is too much is counted to its end and not held.
+        let held = text_bytes.get() <= budget.most(usual_text);
+        std::str::from_utf8(b.data()).ok().filter(|_| held).map(Arc::from)
+    };
     for group in 0..reader.num_row_groups() {
         let group = reader.get_row_group(group)?;
         for (index, (_, values)) in columns.iter_mut().enumerate() {
-            // A file of a few bytes can claim any number of rows: run-length encoding needs none of its own.
             let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(usize::MAX);
-            let most = usize::try_from(bytes).unwrap_or(usize::MAX).saturating_mul(MOST_ROWS_PER_BYTE);
-            if rows > most {
-                return Err(ParquetError::General(format!("{bytes} bytes claim to hold {rows} rows")));
-            }
             match (group.get_column_reader(index)?, values) {
                 (ColumnReader::ByteArrayColumnReader(r), Values::Text(into)) => {
-                    append(r, rows, into, |b: &ByteArray| std::str::from_utf8(b.data()).ok().map(Arc::from))?;
+                    append(r, rows, into, text)?;
+                    budget.check(text_bytes.get(), "bytes of text", usual_text).map_err(external)?;
                 }
                 (ColumnReader::DoubleColumnReader(r), Values::Numbers(into)) => {
                     append(r, rows, into, |v| Some(*v))?;
@@ -92,8 +105,28 @@ fn columns(file: File) -> Result<Vec<Column>, ParquetError> {
     Ok(columns)
 }
 
-/// Most rows that a byte of a file may stand for before it is taken for a bomb.
-const MOST_ROWS_PER_BYTE: usize = 10_000;
+/// Rows that any file may hold, and most that a byte of a larger one may stand for: run-length encoding needs no bytes
+/// of its own for a row.
+const FREE_ROWS: u64 = 1 << 20;
+const MOST_ROWS_PER_BYTE: u64 = 64;
+/// Bytes of text that any file may hold, and how many times its size those of a larger one may be: a dictionary holds
+/// each text once.
+const FREE_TEXT_BYTES: u64 = 64 << 20;
+const MOST_TEXT_TIMES: u64 = 64;
+
+/// Holds the number of rows against the size of the file.
+fn check_counts(metadata: &ParquetMetaData, bytes: u64) -> Result<(), ParquetError> {
+    let rows = metadata.row_groups().iter().fold(0_u64, |sum, group| {
+        // A negative number is none.
+        sum.saturating_add(u64::try_from(group.num_rows()).unwrap_or(u64::MAX))
+    });
+    let usual = FREE_ROWS.max(bytes.saturating_mul(MOST_ROWS_PER_BYTE));
+    Budget::in_use().check(rows, &format!("rows in {bytes} bytes"), usual).map_err(external)
+}
+
+fn external(error: DataError) -> ParquetError {
+    ParquetError::External(Box::new(error))
+}
 
 fn append<T: DataType, V>(
     mut reader: ColumnReaderImpl<T>,

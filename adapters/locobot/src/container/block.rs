@@ -8,16 +8,15 @@ use rayon::prelude::*;
 use vice_core::error::{DataError, DataResult};
 
 use super::bytes::Bytes;
+use super::claims::{FREE_BYTES, Unpacked, over_budget};
 use super::indexed::{Indexed, Listed};
 use super::{Locator, Payload, Scan, Visitor};
 
-/// Bytes beyond which a block is refused: recorders write blocks of about a megabyte, or of one message.
-const MAX_BLOCK_BYTES: u64 = 1 << 30;
-/// Bytes from which on a block must not unpack to more than [`MOST_TIMES`] its size: no robot sees that much of nothing.
-const LARGE_BYTES: u64 = 16 << 20;
-const MOST_TIMES: u64 = 1000;
-/// Bytes reserved on the word of a header, before any data is seen.
-const TRUSTED_BYTES: u64 = 64 << 20;
+/// Bytes that are unpacked at once by several threads, beside the first block of them.
+const BATCH_BYTES: u64 = 64 << 20;
+/// Bytes reserved on the word of a header, before any data is seen: so many, or so many times those that are stored.
+const TRUSTED_BYTES: u64 = 1 << 20;
+const TRUSTED_TIMES: u64 = 32;
 /// Blocks kept: a step forward needs those of the colour and the depth image, and their successors.
 const CACHED_BLOCKS: usize = 4;
 /// Bytes kept, beside the newest block.
@@ -93,18 +92,20 @@ pub(super) fn decompress(
     out: &mut Vec<u8>,
 ) -> Option<String> {
     out.clear();
-    if size > MAX_BLOCK_BYTES {
-        return Some(format!("claims {size} bytes, more than {MAX_BLOCK_BYTES} is not read"));
+    let packed = stored.len() as u64;
+    if let Some(problem) = over_budget(size, packed) {
+        return Some(problem);
     }
+    let trusted = TRUSTED_BYTES.max(packed.saturating_mul(TRUSTED_TIMES)).min(FREE_BYTES);
     if compression != Compression::None {
-        out.reserve_exact(size.min(TRUSTED_BYTES) as usize);
+        out.reserve_exact(size.min(trusted) as usize);
     }
     let done = match compression {
         Compression::None => {
             *out = stored;
             Ok(0)
         }
-        Compression::Zstd if !salvage && size <= TRUSTED_BYTES => {
+        Compression::Zstd if !salvage && size <= trusted => {
             // The buffer may be larger than this block: what does not fit its header is refused below.
             zstd::bulk::Decompressor::new().and_then(|mut d| d.decompress_to_buffer(&stored, out))
         }
@@ -203,6 +204,8 @@ pub(super) struct State {
     pub(super) schemas: std::collections::HashMap<u16, String>,
     /// Messages whose connection or channel was never described.
     pub(super) orphans: u64,
+    /// Bytes that messages unpacked to beyond what messages usually do, all together.
+    pub(super) beyond_usual: u64,
 }
 
 type Decompressed = Result<Arc<Vec<u8>>, String>;
@@ -245,12 +248,8 @@ impl BlockFile {
     /// Reads and decompresses a block into `out`; gives why where that is not everything.
     fn load(&self, block: &Block, out: &mut Vec<u8>) -> Option<String> {
         out.clear();
-        if block.stored > MAX_BLOCK_BYTES {
-            return Some(format!("has {} bytes, too many to be read", block.stored));
-        }
-        if block.size > LARGE_BYTES && block.size / block.stored.max(1) > MOST_TIMES {
-            let (size, stored) = (block.size, block.stored);
-            return Some(format!("claims {size} bytes in {stored}, more than {MOST_TIMES} times as many"));
+        if let Some(problem) = over_budget(block.size, block.stored) {
+            return Some(problem);
         }
         let stored = match self.read_vec(block.offset, block.stored) {
             Ok(stored) => stored,
@@ -364,6 +363,7 @@ impl BlockFile {
         let mut state = State::default();
         let mut buffers = vec![Vec::new(); rayon::current_num_threads().min(16)];
         let (mut at, mut ahead) = (0, 0);
+        let mut unpacked = Unpacked::of(self.len());
         while at < blocks.len() {
             self.bytes.all_had()?;
             if at >= ahead {
@@ -386,7 +386,18 @@ impl BlockFile {
             let more = blocks[at + 1..ahead]
                 .iter()
                 .take_while(|b| !b.is_plain() && !self.only_counts(b, &state, scan));
+            let mut together = 0;
+            let more = more.take_while(|b| {
+                together += b.size;
+                together <= BATCH_BYTES
+            });
             let batch: Vec<&Block> = [&blocks[at]].into_iter().chain(more).take(buffers.len()).collect();
+            let mut packed = batch.iter().filter(|b| b.compression != Compression::None);
+            if let Err(error) = packed.try_for_each(|b| unpacked.add(b.size)) {
+                // First, since it says why what follows is missing.
+                scan.damage.insert(0, error.at(path).byte(blocks[at].offset).to_string());
+                break;
+            }
             let each = batch.par_iter().zip(&mut buffers);
             let problems: Vec<_> = each.map(|(block, buffer)| self.load(block, buffer)).collect();
             for ((block, bytes), problem) in batch.into_iter().zip(&buffers).zip(problems) {

@@ -12,7 +12,7 @@ use rusqlite::{Connection, OpenFlags};
 use vice_core::error::{DataError, DataResult};
 use vice_core::time::Stamp;
 
-use super::unpack::log_of;
+use super::unpack::{beyond_usual, log_of, most_beyond_usual, most_of_message, too_much};
 use super::{Container, HEAD_BYTES, Locator, MAX_MESSAGE_BYTES, Message, Payload, Scan, Visitor, Want};
 
 /// What a data base starts with.
@@ -105,9 +105,13 @@ impl Db3 {
             blob.read_exact(&mut bytes).map_err(read)?;
             return Ok(bytes);
         }
-        let limit = if head { HEAD_BYTES as u64 } else { MAX_MESSAGE_BYTES };
+        let most = most_of_message(size);
+        let limit = if head { HEAD_BYTES as u64 } else { MAX_MESSAGE_BYTES.min(most + 1) };
         let decoder = zstd::stream::read::Decoder::new(blob).map_err(read)?;
         decoder.take(limit).read_to_end(&mut bytes).map_err(read)?;
+        if bytes.len() as u64 > most {
+            return Err(DataError::new(format!("message {row}: {}", too_much(size))));
+        }
         Ok(bytes)
     }
 
@@ -132,6 +136,7 @@ impl Db3 {
         );
         let mut query = connection.prepare(&query).map_err(wrong())?;
         let mut rows = query.query([*last]).map_err(wrong())?;
+        let mut unpacked = 0;
         while let Some(row) = rows.next().map_err(wrong())? {
             let id: i64 = row.get(0).map_err(wrong())?;
             let (topic, nanos): (i64, i64) = (row.get(1).map_err(wrong())?, row.get(2).map_err(wrong())?);
@@ -150,6 +155,14 @@ impl Db3 {
                 ValueRef::Blob(bytes) => bytes,
                 _ => {
                     read = self.message(&connection, id, want == Want::Head)?;
+                    unpacked += read.len() as u64;
+                    // Of all messages together no more than the file could hold.
+                    if self.compressed && beyond_usual(self.len, unpacked) > most_beyond_usual() {
+                        return Err(DataError::new(format!(
+                            "up to message {id} they unpack to too much: {}",
+                            too_much(self.len)
+                        )));
+                    }
                     &read
                 }
             };

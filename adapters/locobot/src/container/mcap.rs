@@ -211,7 +211,8 @@ impl Records for McapRecords {
                     if let Some(wanted) = wanted.filter(|_| data <= MAX_MESSAGE_BYTES)
                         && let Some(bytes) = source.get(content + MESSAGE_PREFIX, wanted as usize)?
                     {
-                        let plain = match bytes.starts_with(unpack::ZSTD_MAGIC) {
+                        let in_budget = state.beyond_usual <= unpack::most_beyond_usual();
+                        let plain = match in_budget && bytes.starts_with(unpack::ZSTD_MAGIC) {
                             true => {
                                 let all =
                                     source.get(content + MESSAGE_PREFIX, data as usize)?.unwrap_or_default();
@@ -220,7 +221,11 @@ impl Records for McapRecords {
                                     Want::Head | Want::Nothing => HEAD_BYTES as u64,
                                 };
                                 // One that is damaged is for whoever decodes it to complain about.
-                                unpack::message(all, limit).ok().flatten()
+                                let unpacked = unpack::message(all, limit).ok().flatten();
+                                let most = unpack::most_of_message(data).min(limit);
+                                let length = unpacked.as_ref().map_or(most, |plain| plain.len() as u64);
+                                state.beyond_usual += unpack::beyond_usual(data, length);
+                                unpacked
                             }
                             false => None,
                         };

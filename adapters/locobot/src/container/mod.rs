@@ -7,6 +7,7 @@
 mod ahead;
 mod block;
 mod bytes;
+mod claims;
 mod db3;
 mod find;
 mod indexed;

@@ -7,6 +7,7 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
+use vice_core::budget::Budget;
 use vice_core::error::{DataError, DataResult};
 
 /// What a file starts with that is compressed with zstd.
@@ -16,7 +17,10 @@ const ZSTD_ENDINGS: [&str; 2] = [".zstd", ".zst"];
 /// How many times its own size a file may unpack to, beyond [`UNPACKED_BYTES`].
 const UNPACKED_TIMES: u64 = 100;
 /// Bytes that any file may unpack to.
-const UNPACKED_BYTES: u64 = 1 << 30;
+const UNPACKED_BYTES: u64 = 256 << 20;
+/// Bytes that any message may unpack to, and how many times its size a larger one may.
+const MESSAGE_BYTES: u64 = 64 << 20;
+const MESSAGE_TIMES: u64 = 64;
 /// Bytes of a data base beyond which it is not copied for the sake of its log.
 const MAX_COPY_BYTES: u64 = 16 << 30;
 /// What sqlite puts behind the name of a data base: the log of what is not in it yet, and that of what is to be undone.
@@ -65,7 +69,8 @@ pub(super) fn unpack(path: &Path) -> DataResult<Copy> {
             .because(e)
     };
     let stored = path.metadata().map_err(failed)?.len();
-    let limit = UNPACKED_BYTES.max(stored.saturating_mul(UNPACKED_TIMES));
+    let usual = UNPACKED_BYTES.max(stored.saturating_mul(UNPACKED_TIMES));
+    let limit = Budget::in_use().most(usual);
     let folder = tempfile::tempdir().map_err(failed)?;
     let copy = folder.path().join("unpacked");
     let mut out = File::create(&copy).map_err(failed)?;
@@ -90,8 +95,12 @@ pub(super) fn unpack(path: &Path) -> DataResult<Copy> {
         }
     };
     if done > limit {
-        let problem = format!("the compressed file of {stored} bytes unpacks to more than {limit} bytes");
-        return Err(DataError::new(problem).at(path).hint("if that is right, unpack it with `zstd -d`"));
+        let problem =
+            format!("the compressed file of {stored} bytes unpacks to more than the budget of {limit} bytes");
+        let raised = Budget::raised(2 * limit, usual);
+        return Err(DataError::new(problem)
+            .at(path)
+            .hint(format!("if that is right, unpack it with `zstd -d`, or {raised}")));
     }
     Ok(Copy { path: copy, _folder: folder, damage })
 }
@@ -169,6 +178,37 @@ pub(super) fn message(bytes: &[u8], limit: u64) -> io::Result<Option<Vec<u8>>> {
         return Ok(None);
     }
     let mut plain = Vec::new();
-    zstd::stream::read::Decoder::new(bytes)?.take(limit).read_to_end(&mut plain)?;
+    let most = most_of_message(bytes.len() as u64);
+    let mut decoder = zstd::stream::read::Decoder::new(bytes)?.take(limit.min(most + 1));
+    decoder.read_to_end(&mut plain)?;
+    if plain.len() as u64 > most {
+        return Err(io::Error::other(too_much(bytes.len() as u64)));
+    }
     Ok(Some(plain))
+}
+
+/// The most bytes that a message of so many compressed ones may unpack to.
+pub(super) fn most_of_message(stored: u64) -> u64 {
+    Budget::in_use().most(usual_of_message(stored))
+}
+
+/// Bytes of messages beyond the usual after which none of a file is unpacked any more.
+pub(super) fn most_beyond_usual() -> u64 {
+    Budget::in_use().most(UNPACKED_BYTES)
+}
+
+/// How much of what a message of so many bytes unpacked to is beyond the usual.
+pub(super) fn beyond_usual(stored: u64, unpacked: u64) -> u64 {
+    unpacked.saturating_sub(stored.saturating_mul(MESSAGE_TIMES))
+}
+
+/// What is said of a message that unpacks to more.
+pub(super) fn too_much(stored: u64) -> String {
+    let (most, usual) = (most_of_message(stored), usual_of_message(stored));
+    let raised = Budget::raised(most.saturating_mul(2), usual);
+    format!("a message of {stored} bytes unpacks to more than the budget of {most} ({raised})")
+}
+
+fn usual_of_message(stored: u64) -> u64 {
+    MESSAGE_BYTES.max(stored.saturating_mul(MESSAGE_TIMES))
 }

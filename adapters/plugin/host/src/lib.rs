@@ -12,10 +12,12 @@
 //! description  what it says that it has
 //! dataset      a data set of a plugin
 //! factory      a plugin as a format
+//! isolated     plugins in processes of their own
 //! conformance  what an adapter is expected to do, as a suite that anyone can run
 //! ```
 //!
-//! A plugin is native code and can do whatever the program can. What is checked is what an honest plugin gets wrong: all that it
+//! A plugin is native code and can do whatever the program can, and end it: in a process of its own ([`isolated`]) it ends
+//! that process only. What is checked is what an honest plugin gets wrong: all that it
 //! hands over is validated before the core sees it, and calls of a plugin that is not thread-safe never overlap.
 //! Libraries are never unloaded: their thread-locals and static variables have destructors that would run later.
 
@@ -28,6 +30,7 @@ mod description;
 mod factory;
 mod handle;
 mod host_log;
+pub mod isolated;
 mod library;
 mod place;
 pub mod search;

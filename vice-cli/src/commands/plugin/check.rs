@@ -2,13 +2,14 @@
 
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
-use std::process::{Child, ExitStatus, Stdio};
+use std::process::{Child, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use anyhow::Context;
 use vice_run::core::dataset::OpenOptions;
 use vice_run::host::conformance::{Event, Verdict};
+use vice_run::host::isolated::death;
 
 use super::child;
 use crate::itself::Itself;
@@ -17,9 +18,11 @@ use crate::terminal::{self, Outcome, printable, usage};
 
 /// Arguments of `vice plugin check`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example: vice plugin check libvice_adapter_myrobot.so my_recording --json report.json\n\n\
+#[command(
+    after_help = "Example: vice plugin check libvice_adapter_myrobot.so my_recording --json report.json\n\n\
     `good` is as it should be, `missing` is allowed and says what will not work without it, `suspicious` is allowed but \
-    looks like a mistake, FAULT breaks the contract. The exit code is 1 where there is a fault.")]
+    looks like a mistake, FAULT breaks the contract. The exit code is 1 where there is a fault."
+)]
 pub(crate) struct Args {
     /// The plugin, a shared library.
     #[arg(value_name = "FILE")]
@@ -92,7 +95,7 @@ pub(crate) fn run(args: &Args, itself: &Itself) -> anyhow::Result<Outcome> {
         }
         Ended::Early => {
             let step = report.step.clone();
-            report.find(Verdict::Fault, &format!("{} during: {step}", death(status)))?;
+            report.find(Verdict::Fault, &format!("it {} during: {step}", death(status)))?;
         }
         Ended::Complete => {}
     }
@@ -227,26 +230,5 @@ impl Report {
             count(Verdict::Suspicious),
             count(Verdict::Fault)
         ))
-    }
-}
-
-/// How a process died, in words.
-fn death(status: ExitStatus) -> String {
-    #[cfg(unix)]
-    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
-        let meaning = match signal {
-            4 => "illegal instruction",
-            6 => "abort: an uncaught exception, a failed assertion or a panic",
-            7 => "bus error",
-            8 => "arithmetic error",
-            9 => "killed",
-            11 => "segmentation fault: memory that is not there",
-            _ => "a signal",
-        };
-        return format!("it crashes ({meaning}, signal {signal})");
-    }
-    match status.code() {
-        Some(code) => format!("it ends the program with exit code {code}"),
-        None => "it ends the program".to_string(),
     }
 }

@@ -6,6 +6,7 @@ use std::path::Path;
 use parquet::errors::{ParquetError, Result};
 use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader, RowGroupMetaData};
 use rayon::prelude::*;
+use vice_core::budget::Budget;
 use vice_core::camera::Pixel;
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::label::{Marks, Observation, ObservationList, ObservationSource, Provenance};
@@ -24,8 +25,9 @@ use crate::leniency::Leniency;
 
 /// Row groups that are decoded before their labels are taken: enough for all threads, few enough for the memory.
 const GROUPS_AT_A_TIME: usize = 16;
-/// Most rows that a byte of a file may stand for before it is taken for a bomb: no two labels are the same.
-const MOST_ROWS_PER_BYTE: u64 = 512;
+/// Rows that any file may hold, and most that a byte of a larger one may stand for: no two labels are the same.
+const FREE_ROWS: u64 = 1 << 20;
+const MOST_ROWS_PER_BYTE: u64 = 8;
 /// Stands for no version of a tracker.
 const NO_VERSION: i64 = -1;
 /// Stands for no stamp.
@@ -117,9 +119,8 @@ fn check_counts(metadata: &ParquetMetaData, source: &Source) -> DataResult<u64> 
     if u64::try_from(said) != Ok(rows) {
         return Err(corrupt(format!("the file says that it has {said} rows, its row groups say {rows}")));
     }
-    if rows > source.len().saturating_mul(MOST_ROWS_PER_BYTE) {
-        return Err(corrupt(format!("{} bytes claim to hold {rows} labels", source.len())));
-    }
+    let usual = FREE_ROWS.max(source.len().saturating_mul(MOST_ROWS_PER_BYTE));
+    Budget::in_use().check(rows, &format!("labels in {} bytes", source.len()), usual)?;
     Ok(rows)
 }
 

@@ -5,7 +5,7 @@ mod failure;
 mod guard;
 mod log;
 mod owned;
-mod values;
+pub mod values;
 
 use std::sync::OnceLock;
 

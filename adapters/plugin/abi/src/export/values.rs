@@ -10,12 +10,14 @@ use vice_core::trajectory::Trajectory;
 
 use crate::contract;
 
-pub(super) fn rigid<A, B>(a_from_b: &Rigid<A, B>) -> contract::Rigid {
+/// A rigid transform.
+pub fn rigid<A, B>(a_from_b: &Rigid<A, B>) -> contract::Rigid {
     let q = a_from_b.rotation();
     contract::Rigid { translation_m: a_from_b.translation().into(), rotation_wxyz: [q.w, q.i, q.j, q.k] }
 }
 
-pub(super) fn camera(camera: &Camera) -> contract::Camera {
+/// A camera.
+pub fn camera(camera: &Camera) -> contract::Camera {
     let [fx_px, fy_px, cx_px, cy_px] = camera.fx_fy_cx_cy();
     let given = camera.model().coefficients();
     let mut coefficients = [0.0; contract::MAX_COEFFICIENTS];
@@ -44,7 +46,11 @@ pub(super) fn camera(camera: &Camera) -> contract::Camera {
     }
 }
 
-pub(super) fn pixel_format(format: PixelFormat) -> DataResult<i32> {
+/// What the bytes of an image are.
+///
+/// # Errors
+/// [`DataError`] for pixels that the contract has no word for.
+pub fn pixel_format(format: PixelFormat) -> DataResult<i32> {
     match format {
         PixelFormat::Gray8 => Ok(contract::PIXELS_GRAY8),
         PixelFormat::Rgb8 => Ok(contract::PIXELS_RGB8),
@@ -52,18 +58,21 @@ pub(super) fn pixel_format(format: PixelFormat) -> DataResult<i32> {
     }
 }
 
-pub(super) fn stamps(stamps: &[Stamp]) -> Vec<i64> {
+/// Stamps in nanoseconds.
+pub fn stamps(stamps: &[Stamp]) -> Vec<i64> {
     stamps.iter().map(|s| s.as_nanos()).collect()
 }
 
-pub(super) fn poses(trajectory: &Trajectory) -> Vec<contract::Pose> {
+/// The poses of a trajectory.
+pub fn poses(trajectory: &Trajectory) -> Vec<contract::Pose> {
     trajectory
         .iter()
         .map(|(stamp, pose)| contract::Pose { stamp_ns: stamp.as_nanos(), world_from_body: rigid(&pose) })
         .collect()
 }
 
-pub(super) fn imu(samples: &[ImuSample]) -> Vec<contract::ImuSample> {
+/// Inertial samples.
+pub fn imu(samples: &[ImuSample]) -> Vec<contract::ImuSample> {
     samples
         .iter()
         .map(|s| contract::ImuSample {
@@ -74,7 +83,8 @@ pub(super) fn imu(samples: &[ImuSample]) -> Vec<contract::ImuSample> {
         .collect()
 }
 
-pub(super) fn inertial_state(state: &InertialState) -> contract::InertialState {
+/// An inertial state.
+pub fn inertial_state(state: &InertialState) -> contract::InertialState {
     contract::InertialState {
         stamp_ns: state.stamp.as_nanos(),
         world_from_body: rigid(&state.world_from_body),
@@ -84,7 +94,11 @@ pub(super) fn inertial_state(state: &InertialState) -> contract::InertialState {
     }
 }
 
-pub(super) fn floor(floor: &Floor) -> DataResult<contract::Floor> {
+/// A floor.
+///
+/// # Errors
+/// [`DataError`] for one that the contract has no word for.
+pub fn floor(floor: &Floor) -> DataResult<contract::Floor> {
     let (frame, normal, d_m) = match floor {
         Floor::World(plane) => (contract::FLOOR_WORLD, plane.normal(), plane.d_m()),
         Floor::Body(plane) => (contract::FLOOR_BODY, plane.normal(), plane.d_m()),

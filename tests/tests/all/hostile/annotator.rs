@@ -102,7 +102,7 @@ impl Drop for WithBrowser {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn the_command_line_of_the_browser_tells_other_users_nothing() {
+fn the_annotators_token_stands_in_no_command_line_and_is_used_once() {
     let run = Run::new();
     let vice = WithBrowser::start(&run);
     let asked = vice.opened();
