@@ -52,7 +52,7 @@ impl Request {
         let mut which = integrated.iter();
         streams.names.retain(|_| which.next() != Some(&true));
         streams.estimates.retain(|estimate| *estimate != EstimateSpec::ImuEuler);
-        let request = CheckRequest { dataset: self.dataset.clone(), streams, images: false };
+        let request = CheckRequest { dataset: self.dataset.clone(), streams, images: false, before: None };
         match check_opened(&request, opened, &silent) {
             Ok(document) => assessment.findings = Some(document.findings),
             Err(error) => {

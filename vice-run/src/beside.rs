@@ -13,7 +13,7 @@ use vice_core::imu::{ImuSample, InertialState};
 use vice_core::registry::Registry;
 use vice_core::suspicion::Suspicion;
 use vice_core::time::{Span, Stamp};
-use vice_core::trajectory::{Trajectory, in_other_world};
+use vice_core::trajectory::{PoseCovariance, Trajectory, in_other_world};
 use vice_files::calibration::CalibrationFile;
 use vice_files::image_file;
 use vice_files::once::cached;

@@ -70,7 +70,7 @@ pub fn covariance(
     let count = nees.len() as f64;
     let outside = nees.iter().filter(|n| **n > CHI2_3[1]).count() as f64 / count;
     let times = (median(&mut nees).unwrap_or(f64::NAN) / CHI2_3[0]).sqrt();
-    let state = if times > TOO_SURE || times < TOO_SHY { State::Look } else { State::Ok };
+    let state = if (TOO_SHY..=TOO_SURE).contains(&times) { State::Ok } else { State::Look };
     let rounded = short((1e2 * times).round() / 1e2);
     let says = format!(
         "position errors of {} are {rounded} times what its covariances say; {:.0} % of the poses lie outside their 95 % region",
@@ -103,7 +103,7 @@ fn says_nothing(said: &[PoseCovariance]) -> Option<&'static str> {
     if said.len() > 1 && said.iter().all(|c| place(c) == first) {
         return Some("have one value for ever: they say nothing");
     }
-    diagonals().any(|v| !v.is_finite() || v < 0.0 || v >= NOT_KNOWN_M2).then_some(
+    diagonals().any(|v| !(0.0..NOT_KNOWN_M2).contains(&v)).then_some(
         "hold variances that are negative, or 10^5 m² and more, which is a way to say that nothing is known",
     )
 }

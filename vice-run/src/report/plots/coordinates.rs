@@ -52,6 +52,9 @@ impl Placed<'_> {
     }
 }
 
+/// A stream, times in seconds, and six coordinates at each of them.
+type Curve<'a> = (&'a Key, Vec<f64>, Vec<[f64; 6]>);
+
 /// Position and orientation, a plot each.
 pub(crate) fn coordinates(document: &ResultDocument, keys: &[Key], timeline: &Timeline) -> Vec<Plot> {
     let placed = placed(document, keys);
@@ -59,7 +62,7 @@ pub(crate) fn coordinates(document: &ResultDocument, keys: &[Key], timeline: &Ti
         return vec![];
     }
     let words = placed.words(document);
-    let curves: Vec<(&Key, Vec<f64>, Vec<[f64; 6]>)> = placed
+    let curves: Vec<Curve<'_>> = placed
         .paths
         .iter()
         .map(|(key, path)| {

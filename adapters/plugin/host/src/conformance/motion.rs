@@ -40,6 +40,7 @@ impl Check<'_> {
                             trajectory.median_period()
                         ));
                     }
+                    self.covariances(dataset, name);
                 }
                 Err(error) => self.fault(format!("pose stream {name}: {}", one_line(&error))),
             }
@@ -50,6 +51,18 @@ impl Check<'_> {
             self.missing(format!(
                 "no stream `{GROUND_TRUTH}`: without --reference, trajectories are not compared"
             ));
+        }
+    }
+
+    fn covariances(&mut self, dataset: &dyn Dataset, stream: &str) {
+        match dataset.pose_covariances(stream) {
+            Ok(said) if said.windows(2).all(|pair| pair[0].stamp <= pair[1].stamp) => {
+                if !said.is_empty() {
+                    self.good(format!("pose stream {stream}: {} covariances", said.len()));
+                }
+            }
+            Ok(_) => self.fault(format!("covariances of {stream} are not in the order of time")),
+            Err(error) => self.fault(format!("covariances of {stream}: {}", one_line(&error))),
         }
     }
 
