@@ -1,7 +1,8 @@
 //! Helpers of the whole-program tests: where the shared data is, and the `vice` program itself.
 //!
-//! Cargo does not build another package's program for a test, so [`vice`] builds it once, in the profile and target
-//! folder that the test itself was built in.
+//! Cargo does not build another package's program for a test, but for its own tests: `cargo test --workspace` builds program and
+//! plugins before it runs anything. Where they are older than the sources they are built here, in the profile and target folder
+//! that the test itself was built in.
 #![allow(clippy::expect_used, clippy::panic, clippy::print_stderr)] // A test helper fails its test.
 
 pub mod flawed;
@@ -56,10 +57,7 @@ pub fn build(package: &str) -> PathBuf {
 
 /// As [`build`], with features of the package.
 pub fn build_with(package: &str, features: &str) -> PathBuf {
-    let test_program = std::env::current_exe().expect("a test knows where it is");
-    // target/<profile>/deps/<test>
-    let folder =
-        test_program.ancestors().nth(2).expect("the test lies in target/<profile>/deps").to_path_buf();
+    let folder = folder();
     let profile = match folder.file_name().and_then(|n| n.to_str()).expect("a profile has a name") {
         "debug" => "dev",
         name => name,
@@ -76,10 +74,20 @@ pub fn build_with(package: &str, features: &str) -> PathBuf {
     folder
 }
 
+/// The folder that this test was built in, with the profile's name.
+fn folder() -> PathBuf {
+    let test_program = std::env::current_exe().expect("a test knows where it is");
+    // target/<profile>/deps/<test>
+    test_program.ancestors().nth(2).expect("the test lies in target/<profile>/deps").to_path_buf()
+}
+
 /// A plugin of the workspace as a library, built in this test's own profile.
 pub fn plugin(format: &str) -> PathBuf {
     use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
-    build(&format!("vice-plugin-{format}")).join(format!("{DLL_PREFIX}vice_adapter_{format}{DLL_SUFFIX}"))
+    let name = format!("{DLL_PREFIX}vice_adapter_{format}{DLL_SUFFIX}");
+    // As of the program: `cargo test --workspace` has built it already.
+    let there = folder().join("deps").join(&name);
+    if is_newer_than_sources(&there) { there } else { build(&format!("vice-plugin-{format}")).join(name) }
 }
 
 /// Compiles a source of `tests/plugins` into a shared library `name` of a folder, with the system's C or C++ compiler. A source
@@ -109,7 +117,43 @@ pub fn compile_plugin(source: &str, defines: &[&str], folder: &Path, name: &str)
 /// The `vice` program, built once.
 pub fn vice_program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| build("vice-cli").join(format!("vice{}", std::env::consts::EXE_SUFFIX)))
+    PROGRAM.get_or_init(|| {
+        let name = format!("vice{}", std::env::consts::EXE_SUFFIX);
+        // `cargo test --workspace` has built it already; a test of this package alone has not.
+        let there = folder().join(&name);
+        if is_newer_than_sources(&there) { there } else { build("vice-cli").join(name) }
+    })
+}
+
+/// Whether a program is newer than all that it may be built from.
+fn is_newer_than_sources(program: &Path) -> bool {
+    let changed = |path: &Path| path.metadata().and_then(|m| m.modified()).ok();
+    let Some(built) = changed(program) else { return false };
+    let mut folders = vec![root().to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        let Ok(entries) = std::fs::read_dir(&folder) else { continue };
+        for entry in entries.flatten() {
+            let (path, name) = (entry.path(), entry.file_name());
+            if path.is_dir() {
+                // What no program is built from.
+                let skipped =
+                    ["target", "tests", "benches", "docs", "examples", "fuzz", "vice-py", "node_modules"];
+                let hidden = name.to_string_lossy().starts_with('.');
+                if !(hidden || skipped.iter().any(|s| name == *s)) {
+                    folders.push(path);
+                } else if name == "tests" && folder == root() {
+                    folders.push(path.join("plugins/panicking"));
+                }
+            } else if changed(&path).is_none_or(|at| at > built) {
+                let unused = path.extension().is_some_and(|e| e == "md")
+                    || folder == root() && name != "Cargo.lock" && name != "Cargo.toml";
+                if !unused {
+                    return false;
+                }
+            }
+        }
+    }
+    true
 }
 
 /// What a run of `vice` gave.

@@ -9,6 +9,9 @@ use vice_core::error::{DataError, DataResult, ErrorKind};
 
 /// Bytes beyond which a description file is refused.
 const MAX_BYTES: u64 = 4 << 20;
+/// Values of a file: those of OpenCV list the points of all views that they come from, and no description has more than some ten
+/// thousand.
+const MAX_VALUES: usize = 60_000;
 /// Values that aliases may repeat: a description says little twice, a bomb says everything again and again.
 const MAX_REPEATED: usize = 100_000;
 
@@ -32,6 +35,9 @@ pub fn parse<T: DeserializeOwned>(text: &str) -> DataResult<T> {
     let text = text.replace("!!opencv-matrix", "                ");
     let mut options = serde_saphyr::Options::default();
     options.alias_limits.max_total_replayed_events = MAX_REPEATED;
+    if let Some(budget) = &mut options.budget {
+        budget.max_nodes = MAX_VALUES;
+    }
     serde_saphyr::from_str_with_options(&text, options).map_err(|e| {
         let error = DataError::new(format!("is not the YAML expected: {}", first_line(&e.to_string())));
         match e.location() {

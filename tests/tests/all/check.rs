@@ -196,7 +196,8 @@ fn an_estimate_that_is_late_or_of_another_convention_is_named_with_its_cure() {
         let run = vice(
             &[&["evaluate", data, "--labels", &labels, "--depth", "zmap", "--json", "-"], args].concat(),
         );
-        assert_eq!(run.code, 0, "{}", run.stderr);
+        // Labels beside an edge have no depth where a wrong pose places the camera.
+        assert!([0, 3].contains(&run.code), "{}", run.stderr);
         let document: Value = serde_json::from_str(&run.stdout).unwrap();
         let list = document["suspicions"].as_array().cloned().unwrap_or_default();
         let found = list

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::sync::{Mutex, OnceLock, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use vice_core::budget::Budget;
 use vice_core::error::{DataError, DataResult};
@@ -16,6 +16,8 @@ use crate::LoadOptions;
 
 /// Seconds that a call may take.
 const CALL_SECONDS: u64 = 30;
+/// How long it may take to close a data set when nothing more is asked.
+const CLOSING: Duration = Duration::from_secs(1);
 /// Bytes of one answer; the largest are images and clouds.
 const ANSWER_BYTES: u64 = 2 << 30;
 /// Lines, and bytes of each, that a plugin may say to the user.
@@ -45,7 +47,8 @@ pub(super) struct Process {
 
 struct Inner {
     child: Child,
-    requests: ChildStdin,
+    /// `None` once it was told to end.
+    requests: Option<ChildStdin>,
     answers: Receiver<Vec<u8>>,
     /// Ends when all that it said was passed on.
     log: Receiver<()>,
@@ -77,7 +80,7 @@ impl Process {
         let requests = child.stdin.take().ok_or_else(nothing)?;
         let answers = answers_of(child.stdout.take().ok_or_else(nothing)?);
         let log = tell_log(child.stderr.take().ok_or_else(nothing)?, file.to_path_buf());
-        let inner = Mutex::new(Inner { child, requests, answers, log, ended: None });
+        let inner = Mutex::new(Inner { child, requests: Some(requests), answers, log, ended: None });
         Ok(Self { file: file.to_path_buf(), inner })
     }
 
@@ -113,9 +116,10 @@ impl Process {
 impl Inner {
     fn call(&mut self, request: &[u8]) -> Result<Vec<u8>, String> {
         let length = (request.len() as u64).to_le_bytes();
-        let sent = self.requests.write_all(&length).and_then(|()| self.requests.write_all(request));
         // A process that is gone cannot be written to; how it went is asked below.
-        let sent = sent.and_then(|()| self.requests.flush()).is_ok();
+        let sent = self.requests.as_mut().is_some_and(|pipe| {
+            pipe.write_all(&length).and_then(|()| pipe.write_all(request)).and_then(|()| pipe.flush()).is_ok()
+        });
         let seconds = Budget::in_use().most(CALL_SECONDS).max(1);
         let patience = Duration::from_secs(if sent { seconds } else { 1 });
         match self.answers.recv_timeout(patience) {
@@ -143,7 +147,12 @@ impl Inner {
 impl Drop for Process {
     fn drop(&mut self) {
         let inner = self.inner.get_mut().unwrap_or_else(PoisonError::into_inner);
-        // What it holds goes with it.
+        // It closes what it holds, and may have something to say of that; not for long.
+        drop(inner.requests.take());
+        let until = Instant::now() + CLOSING;
+        while inner.ended.is_none() && matches!(inner.child.try_wait(), Ok(None)) && Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(1));
+        }
         let _ = inner.child.kill();
         let _ = inner.child.wait();
         // What it said last; not for long, since what it started may hold the pipe open.

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::channel;
+use std::time::Duration;
 
 use vice_core::budget::Budget;
 use vice_core::dataset::{Dataset, DatasetFactory, OpenOptions};
@@ -16,6 +17,8 @@ use crate::{LoadOptions, Plugin};
 
 /// Bytes of memory that a plugin may ask for, that of the program in it included.
 const MEMORY_BYTES: u64 = 4 << 30;
+/// How long a plugin may take to close a data set when nothing more is asked.
+const CLOSING: Duration = Duration::from_secs(2);
 /// Bytes of a request, which holds names and numbers.
 const REQUEST_BYTES: u64 = 16 << 20;
 
@@ -35,6 +38,9 @@ pub fn serve(file: &Path, options: &LoadOptions) -> DataResult<()> {
         loop {
             let mut length = [0; 8];
             if requests.read_exact(&mut length).is_err() {
+                // The program asks no more, or is gone: what is open is closed, unless the plugin hangs.
+                drop(send);
+                std::thread::sleep(CLOSING);
                 std::process::exit(0);
             }
             let length = u64::from_le_bytes(length);
