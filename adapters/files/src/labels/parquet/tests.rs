@@ -41,7 +41,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
     fn everything_is_kept_to_the_last_bit(
-        mut labels in any_labels(), dataset in prop::option::of("\\PC*"), camera in prop::option::of("\\PC*"),
+        mut labels in any_labels(), dataset in prop::option::of("\\PC*"), camera in prop::option::of("\\PC+"),
     ) {
         (labels.dataset, labels.camera) = (dataset, camera);
         let (_folder, path) = folder();

@@ -106,7 +106,7 @@ fn what_does_not_fit_is_refused() {
     let flat = npy("<f4", false, "(12,)", &floats(&PLACES));
     assert!(read(&flat, 3, &Default::default()).unwrap_err().to_string().contains("not (frames, points, 2)"));
     let huge = npy("<f8", false, "(99999999, 99999999, 2)", &[]);
-    assert!(read(&huge, 3, &Default::default()).unwrap_err().to_string().contains("too large"));
+    assert!(read(&huge, 3, &Default::default()).unwrap_err().to_string().contains("above the budget"));
     let other = npz(&[("flow", bytes.clone())], zip::CompressionMethod::Stored);
     assert!(read(&other, 3, &Default::default()).unwrap_err().to_string().contains("it has flow"));
     let seen = npy("|b1", false, "(4, 2)", &[1; 8]);
