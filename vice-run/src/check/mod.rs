@@ -95,7 +95,7 @@ impl CheckRequest {
 /// Checks a recording. `progress` is told how many images of how many were looked at.
 ///
 /// # Errors
-/// [`RunError`](crate::error::RunError) if no format reads it, or a stream that is named cannot be read.
+/// [`RunError`] if no format reads it, or a stream that is named cannot be read.
 pub fn check(request: &CheckRequest, progress: &Progress<'_>) -> RunResult<CheckDocument> {
     let spec = &request.dataset;
     check_open(request, spec.open_raw(&formats::registry(&spec.plugins)?)?, progress)
