@@ -61,7 +61,9 @@ impl LabelsSpec {
                     points => labels::read_points(place.path(), frames, points),
                 })?;
                 let shown = address::shown_path(&self.file);
-                let file = file.of_camera(&opened.camera_name).map_err(|e| e.at(&shown))?;
+                let file = file
+                    .of_camera(&opened.camera_name, &opened.dataset.cameras())
+                    .map_err(|e| e.at(&shown))?;
                 file.check_image_size(opened.camera.width(), opened.camera.height())
                     .map_err(|e| e.at(shown))?;
                 (file.labels, file.suspicions)

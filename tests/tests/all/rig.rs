@@ -177,6 +177,12 @@ fn labels_of_another_camera_are_refused_and_old_files_are_of_the_one_that_is_ask
         let run = flight.evaluate(&to, &["--camera", "cam0"]);
         assert!(run.code == 1 && run.stderr.contains("holds labels of camera cam1"), "{name} {}", run.stderr);
     }
+    // A camera that the data set does not have is another name of the one that is asked for, or another recording's: doubted.
+    let elsewhere = flight.write("elsewhere.csv", &flight.of_cameras(|_| "front"));
+    let run = flight.evaluate(&elsewhere, &["--camera", "cam0"]);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let said = format!("{}{}", run.stdout, run.stderr);
+    assert!(said.contains("a camera front, which the data set does not have"), "{said}");
     // A file of several cameras is no set of labels before one is chosen.
     let both =
         flight.write("both.csv", &flight.of_cameras(|point| if point == "0" { "cam0" } else { "cam1" }));

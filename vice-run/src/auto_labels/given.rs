@@ -27,7 +27,8 @@ impl Givens {
         let place = Place::of_file(file)?;
         let read = place.told(labels::read_file(place.path(), Some(&opened.frames)))?;
         let shown = address::shown_path(file);
-        let read = read.of_camera(&opened.camera_name).map_err(|e| e.at(&shown))?;
+        let read =
+            read.of_camera(&opened.camera_name, &opened.dataset.cameras()).map_err(|e| e.at(&shown))?;
         read.check_image_size(opened.camera.width(), opened.camera.height()).map_err(|e| e.at(&shown))?;
         let wrong = |what: String| RunError::usage("from", format!("{}: {what}", shown.display()));
         for point in read.labels.points() {

@@ -2,6 +2,7 @@
 
 use vice_core::error::{DataError, DataResult, ErrorKind};
 use vice_core::label::{LabelError, LabelSet, LabelSetBuilder};
+use vice_core::suspicion::Suspicion;
 
 use super::LabelFile;
 
@@ -64,13 +65,23 @@ impl LabelFile {
         std::iter::once(&self.labels).chain(&self.of_other_cameras)
     }
 
-    /// With the labels of a camera alone. A file that names no camera is of the one that is asked for.
+    /// With the labels of a camera alone, of a data set with the cameras `known`. A file that names no camera is of the one that is
+    /// asked for. So is one of a single camera that the data set does not have at all, since the same camera has another name in
+    /// each format; that is doubted.
     ///
     /// # Errors
     /// [`DataError`] with the cameras that there are, if it is none of them.
-    pub fn of_camera(mut self, camera: &str) -> DataResult<Self> {
+    pub fn of_camera(mut self, camera: &str, known: &[String]) -> DataResult<Self> {
         let is_it = |labels: &LabelSet| labels.camera.as_deref().is_none_or(|name| name == camera);
-        if !is_it(&self.labels) {
+        let unknown = self.labels.camera.as_ref().filter(|name| !known.contains(name));
+        if let (Some(name), true, false) = (unknown, self.of_other_cameras.is_empty(), is_it(&self.labels)) {
+            let says =
+                format!("the labels say that they are of a camera {name}, which the data set does not have");
+            let doubt = Suspicion::new("labels-other-camera", "labels", says)
+                .evidence(format!("they are taken as those of {camera}"))
+                .advice("see whether they were made on this recording");
+            self.suspicions.add(doubt);
+        } else if !is_it(&self.labels) {
             let Some(place) = self.of_other_cameras.iter().position(is_it) else {
                 let cameras = self.cameras();
                 let problem = format!("holds labels of camera {}, not of {camera}", cameras.join(", "));

@@ -140,7 +140,11 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     terminal::warn(file.suspicions.iter());
     let at = |e: vice_run::core::error::DataError| e.at(&args.input);
     let mut set = match &args.camera {
-        Some(camera) => file.of_camera(camera).map_err(at)?.labels,
+        Some(camera) => {
+            // No data set says which cameras there are: those of the file are taken at their word.
+            let known: Vec<String> = file.cameras().into_iter().map(str::to_string).collect();
+            file.of_camera(camera, &known).map_err(at)?.labels
+        }
         None => file.of_one_camera().map_err(at)?,
     };
     if let Some(camera) = &args.camera {
