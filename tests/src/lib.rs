@@ -86,8 +86,7 @@ pub fn plugin(format: &str) -> PathBuf {
     use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
     let name = format!("{DLL_PREFIX}vice_adapter_{format}{DLL_SUFFIX}");
     // As of the program: `cargo test --workspace` has built it already.
-    let there = folder().join("deps").join(&name);
-    if is_newer_than_sources(&there) { there } else { build(&format!("vice-plugin-{format}")).join(name) }
+    up_to_date(folder().join("deps").join(&name), &format!("vice-plugin-{format}"), &name)
 }
 
 /// Compiles a source of `tests/plugins` into a shared library `name` of a folder, with the system's C or C++ compiler. A source
@@ -120,9 +119,13 @@ pub fn vice_program() -> &'static Path {
     PROGRAM.get_or_init(|| {
         let name = format!("vice{}", std::env::consts::EXE_SUFFIX);
         // `cargo test --workspace` has built it already; a test of this package alone has not.
-        let there = folder().join(&name);
-        if is_newer_than_sources(&there) { there } else { build("vice-cli").join(name) }
+        up_to_date(folder().join(&name), "vice-cli", &name)
     })
+}
+
+/// What is there, where it is newer than the sources; else what a build of the package gives under a name.
+fn up_to_date(there: PathBuf, package: &str, name: &str) -> PathBuf {
+    if is_newer_than_sources(&there) { there } else { build(package).join(name) }
 }
 
 /// Whether a program is newer than all that it may be built from.

@@ -12,7 +12,7 @@ use vice_run::require::{Requirement, broken};
 use vice_run::result::{MAX_SKIPPED_PERCENT, ResultDocument};
 
 use super::evaluate_rig::{self, Files};
-use super::report::{PageArgs, run_of};
+use super::report::{PageArgs, run_of, warn_of_pictures};
 use crate::inputs::{EvaluationArgs, on_off};
 use crate::outputs::Outputs;
 use crate::terminal::{self, Outcome, Verbosity, usage, with_progress};
@@ -135,9 +135,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
     let page = match &files.report {
         Some(path) => {
             let run = run_of(document.clone(), &request, &opened, IMAGE_BUDGET_BYTES, &files.page, verbosity);
-            if let Some(problem) = &run.shots.problem {
-                tracing::warn!("{}: {problem}", path.display());
-            }
+            warn_of_pictures(&run, path);
             Some((path, render(&[run])?))
         }
         None => None,

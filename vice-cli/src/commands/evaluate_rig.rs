@@ -8,7 +8,7 @@ use vice_run::request::Request;
 use vice_run::result::ResultDocument;
 use vice_run::rig::{Rig, RigDocument};
 
-use super::report::{PageArgs, run_of};
+use super::report::{PageArgs, run_of, warn_of_pictures};
 use crate::outputs::Outputs;
 use crate::terminal::{self, Verbosity, printable, with_progress};
 
@@ -40,9 +40,7 @@ pub(super) fn run(
             let budget = IMAGE_BUDGET_BYTES / document.cameras.len().max(1);
             let of_camera = |(one, (request, opened)): (&ResultDocument, &(Request, Opened))| {
                 let mut run = run_of(one.clone(), request, opened, budget, files.page, verbosity);
-                if let Some(problem) = &run.shots.problem {
-                    tracing::warn!("{}: {problem}", path.display());
-                }
+                warn_of_pictures(&run, path);
                 run.name = format!("{}: {}", run.name, printable(&opened.camera_name));
                 run
             };

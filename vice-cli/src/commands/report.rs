@@ -1,6 +1,6 @@
 //! `vice report`: result documents as a page.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
 
@@ -80,9 +80,7 @@ pub(crate) fn run(args: &Args, verbosity: Verbosity) -> anyhow::Result<Outcome> 
         .zip(&args.results)
         .map(|(document, path)| {
             let mut run = read_again(document, args, budget, verbosity);
-            if let Some(problem) = &run.shots.problem {
-                tracing::warn!("{}: {problem}", path.display());
-            }
+            warn_of_pictures(&run, path);
             if several {
                 let file = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
                 run.name = format!("{}: {}", printable(&file), run.name);
@@ -138,6 +136,13 @@ pub(crate) fn run_of(
         run.stamp = page.stamp.then(stamp);
         run
     })
+}
+
+/// Says which pictures a page lacks.
+pub(crate) fn warn_of_pictures(run: &Run, page: &Path) {
+    if let Some(problem) = &run.shots.problem {
+        tracing::warn!("{}: {problem}", page.display());
+    }
 }
 
 /// When it is, and on which computer.

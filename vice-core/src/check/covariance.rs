@@ -93,19 +93,21 @@ pub fn covariance(
 
 /// Why covariances say nothing at all.
 fn says_nothing(said: &[PoseCovariance]) -> Option<&'static str> {
-    let place = |c: &PoseCovariance| c.matrix.fixed_view::<3, 3>(0, 0).into_owned();
-    let first = said.first().map(place)?;
-    let diagonals =
-        || said.iter().flat_map(|c| c.matrix.diagonal().into_iter().take(3).copied().collect::<Vec<_>>());
-    if diagonals().all(|v| v == 0.0) {
+    let first = of_position(&said.first()?.matrix);
+    let variances = || said.iter().flat_map(|c| (0..3).map(|axis| c.matrix[(axis, axis)]));
+    if variances().all(|v| v == 0.0) {
         return Some("are all zero: they say nothing");
     }
-    if said.len() > 1 && said.iter().all(|c| place(c) == first) {
+    if said.len() > 1 && said.iter().all(|c| of_position(&c.matrix) == first) {
         return Some("have one value for ever: they say nothing");
     }
-    diagonals().any(|v| !(0.0..NOT_KNOWN_M2).contains(&v)).then_some(
+    variances().any(|v| !(0.0..NOT_KNOWN_M2).contains(&v)).then_some(
         "hold variances that are negative, or 10^5 m² and more, which is a way to say that nothing is known",
     )
+}
+
+fn of_position(matrix: &Matrix6<f64>) -> Matrix3<f64> {
+    matrix.fixed_view::<3, 3>(0, 0).into_owned()
 }
 
 struct Row {
@@ -121,9 +123,11 @@ impl Row {
         let error = self.pose.translation() - (own_from_truth * self.truth).translation();
         let way: Vector3<f64> = self.pose.translation() - first.pose.translation();
         let cross = way.cross_matrix();
-        let place = |row: &Self| row.said.fixed_view::<3, 3>(0, 0).into_owned();
         let turned: Matrix3<f64> = cross * first.said.fixed_view::<3, 3>(3, 3) * cross.transpose();
-        let sum = place(self) + place(first) + turned + Matrix3::identity() * REFERENCE_M.powi(2);
+        let sum = of_position(&self.said)
+            + of_position(&first.said)
+            + turned
+            + Matrix3::identity() * REFERENCE_M.powi(2);
         let symmetric = 0.5 * (sum + sum.transpose());
         Some(error.dot(&symmetric.cholesky()?.solve(&error)))
     }

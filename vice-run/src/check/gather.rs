@@ -394,14 +394,14 @@ impl Offsets {
     /// What is added to the second one's stamps for the first one's clock; nothing where it is not known.
     fn of(&self, first: &str, second: &str) -> Span {
         let found = self.0.iter().find_map(|(a, b, answer)| {
-            let sign = match () {
-                () if a == first && b == second => 1.0,
-                () if a == second && b == first => -1.0,
-                () => return None,
-            };
-            Some(sign * answer.as_ref().ok()?.offset_s)
+            let offset = answer.as_ref().ok()?.span();
+            match () {
+                () if a == first && b == second => Some(offset),
+                () if a == second && b == first => Some(-offset),
+                () => None,
+            }
         });
-        found.and_then(|s| Span::from_secs_f64(s).ok()).unwrap_or(Span::ZERO)
+        found.unwrap_or(Span::ZERO)
     }
 }
 

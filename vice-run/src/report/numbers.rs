@@ -35,10 +35,15 @@ pub(crate) fn correlation(pairs: &[(f64, f64)]) -> Option<f64> {
 
 /// Mean error of the points at each frame, pixels.
 pub(crate) fn mean_by_frame(part: &PixelPart) -> BTreeMap<Stamp, f64> {
+    means(part.samples.iter().map(|sample| (sample.timestamp_ns, sample.error_px)))
+}
+
+/// The mean of the values at each stamp.
+pub(crate) fn means(values: impl Iterator<Item = (Stamp, f64)>) -> BTreeMap<Stamp, f64> {
     let mut sums: BTreeMap<Stamp, (f64, u64)> = BTreeMap::new();
-    for sample in &part.samples {
-        let sum = sums.entry(sample.timestamp_ns).or_default();
-        *sum = (sum.0 + sample.error_px, sum.1 + 1);
+    for (stamp, value) in values {
+        let sum = sums.entry(stamp).or_default();
+        *sum = (sum.0 + value, sum.1 + 1);
     }
     sums.into_iter().map(|(stamp, (sum, count))| (stamp, sum / count as f64)).collect()
 }

@@ -1,6 +1,6 @@
 //! What `vice check` calls wrong of what is evaluated: said beside the numbers, never mended by itself.
 
-use vice_core::check::clock::{self, ClockOffset, clock_offset};
+use vice_core::check::clock::{self, clock_offset};
 use vice_core::check::turning::Turning;
 use vice_core::check::{Finding, State, inertial, motion, optics, path};
 use vice_core::conventions::Given;
@@ -45,7 +45,7 @@ pub(super) fn wrong(opened: &Opened, streams: &[Stream], integrated: Option<usiz
                 let late = suspicions(vec![clock::finding(truth.0, &stream.name, answer)]);
                 said.extend(late.into_iter().map(|suspicion| beside(suspicion, stream.time_offset)));
             }
-            let offset = answer.and_then(Result::ok).map_or(Span::ZERO, span);
+            let offset = answer.and_then(Result::ok).map_or(Span::ZERO, |found| found.span());
             said.extend(suspicions(motion::motion(truth, (&stream.name, &stream.trajectory), offset, given)));
         }
     } else if let Ok(imu) = opened.dataset.imu()
@@ -61,7 +61,7 @@ pub(super) fn wrong(opened: &Opened, streams: &[Stream], integrated: Option<usiz
             said.extend(suspicions(inertial::inertial(
                 &imu,
                 poses,
-                answer.map_or(Span::ZERO, span),
+                answer.map_or(Span::ZERO, |found| found.span()),
                 is_truth,
                 given,
             )));
@@ -95,8 +95,4 @@ fn beside(mut suspicion: Suspicion, added: Span) -> Suspicion {
             .push_str(&format!(" beside the {} s that are added already", added.to_seconds_text()));
     }
     suspicion
-}
-
-fn span(found: ClockOffset) -> Span {
-    Span::from_secs_f64(found.offset_s).unwrap_or(Span::ZERO)
 }

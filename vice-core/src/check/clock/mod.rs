@@ -343,6 +343,11 @@ impl<'a> Search<'a> {
 }
 
 impl ClockOffset {
+    /// What is added to the stamps of the estimate.
+    pub fn span(&self) -> Span {
+        Span::from_secs_f64(self.offset_s).unwrap_or(Span::ZERO)
+    }
+
     /// By how much the offset changes over what both have in common, seconds.
     pub fn grows_s(&self) -> f64 {
         self.rate.map_or(0.0, |r| r.share * self.seconds)

@@ -1,17 +1,13 @@
 //! All streams in one plot: the pixel error, which starts anew at each key frame, over the errors that motion capture
 //! tells, as the paper's last figure has them.
 
-use std::collections::BTreeMap;
-
 use vice_core::result::{MotionError, PixelPart, Role, TrajectoryPart};
-use vice_core::time::Stamp;
 
 use super::axis::Axis;
-use super::panel::usual_gap;
 use super::timeline::Timeline;
 use super::{NONE_PX, Plot};
 use crate::report::keys::{Key, of};
-use crate::report::numbers::{mean_by_frame, px};
+use crate::report::numbers::{mean_by_frame, means, px};
 use crate::result::ResultDocument;
 
 /// The curve of a stream.
@@ -29,13 +25,8 @@ pub(crate) fn all_streams(document: &ResultDocument, keys: &[Key], timeline: &Ti
     if parts.is_empty() {
         return None;
     }
-    let pixels: Vec<Curve<'_>> = parts
-        .iter()
-        .map(|(key, part)| {
-            let means = mean_by_frame(part).into_iter();
-            (*key, means.map(|(stamp, error)| (timeline.seconds(stamp), error)).collect())
-        })
-        .collect();
+    let pixels: Vec<Curve<'_>> =
+        parts.iter().map(|(key, part)| (*key, timeline.curve(mean_by_frame(part)))).collect();
     let estimates: Vec<(&Key, &TrajectoryPart)> = document
         .trajectory
         .iter()
@@ -45,9 +36,7 @@ pub(crate) fn all_streams(document: &ResultDocument, keys: &[Key], timeline: &Ti
         estimates.iter().map(|(key, t)| (*key, since_keyframe(t, timeline, value))).collect()
     };
     let aligned = |value: fn(&vice_core::result::FrameError) -> f64| -> Vec<Curve<'_>> {
-        let curve = |t: &TrajectoryPart| {
-            t.frames.iter().map(|f| (timeline.seconds(f.timestamp_ns), value(f))).collect()
-        };
+        let curve = |t: &TrajectoryPart| timeline.curve(t.frames.iter().map(|f| (f.timestamp_ns, value(f))));
         estimates.iter().map(|(key, t)| (*key, curve(t))).collect()
     };
     let all = [
@@ -64,9 +53,7 @@ pub(crate) fn all_streams(document: &ResultDocument, keys: &[Key], timeline: &Ti
         let y = Axis::from_zero(curves.iter().flat_map(|c| c.1.iter().map(|v| v.1)).chain([least]), 4);
         timeline.panel(&mut picture, (index, panels.len()), (title, unit), y, |picture, panel| {
             for (key, values) in curves {
-                picture.begin_stream(key);
-                panel.line(picture, key.class, values, usual_gap(values));
-                picture.end();
+                panel.stream(picture, key, values);
             }
             timeline.dots(picture, panel);
         });
@@ -81,12 +68,8 @@ fn since_keyframe(
     timeline: &Timeline,
     value: fn(&MotionError) -> f64,
 ) -> Vec<(f64, f64)> {
-    let mut sums: BTreeMap<Stamp, (f64, f64)> = BTreeMap::new();
-    for motion in part.since_keyframe.iter().filter(|m| value(m).is_finite()) {
-        let sum = sums.entry(motion.timestamp_ns).or_default();
-        *sum = (sum.0 + value(motion), sum.1 + 1.0);
-    }
-    sums.into_iter().map(|(stamp, (sum, count))| (timeline.seconds(stamp), sum / count)).collect()
+    let values = part.since_keyframe.iter().map(|m| (m.timestamp_ns, value(m)));
+    timeline.curve(means(values.filter(|(_, value)| value.is_finite())))
 }
 
 fn says(parts: &[(&Key, &PixelPart)], alone: bool) -> String {
@@ -109,6 +92,7 @@ mod tests {
     use crate::report::keys::keys;
     use crate::report::testing::{document, keyframe, part, sample};
     use vice_core::result::FrameError;
+    use vice_core::time::Stamp;
 
     fn both() -> ResultDocument {
         let second = 1_000_000_000;

@@ -5,7 +5,6 @@ use vice_core::result::{PathPart, PathPose};
 
 use super::Plot;
 use super::axis::Axis;
-use super::panel::usual_gap;
 use super::timeline::Timeline;
 use crate::report::keys::{Key, of};
 use crate::result::ResultDocument;
@@ -79,9 +78,7 @@ pub(crate) fn coordinates(document: &ResultDocument, keys: &[Key], timeline: &Ti
                 for (key, times, values) in &curves {
                     let curve: Vec<(f64, f64)> =
                         times.iter().zip(values).map(|(t, v)| (*t, v[column])).collect();
-                    picture.begin_stream(key);
-                    panel.line(picture, key.class, &curve, usual_gap(&curve));
-                    picture.end();
+                    panel.stream(picture, key, &curve);
                 }
             });
         }

@@ -2,16 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use vice_core::result::{PixelPart, PointName};
+use vice_core::result::{PixelPart, PointName, Sample};
 use vice_core::statistics::median;
 use vice_core::time::Stamp;
 
 use super::axis::Axis;
-use super::panel::usual_gap;
 use super::timeline::Timeline;
 use super::{NONE_PX, Plot};
 use crate::report::keys::{Key, of};
-use crate::report::numbers::px;
+use crate::report::numbers::{means, px};
 use crate::result::ResultDocument;
 use crate::text::printable;
 
@@ -56,9 +55,7 @@ fn difference(
     let title = "pixel error, change by the other depth";
     timeline.panel(&mut picture, (0, 2), (title, "px"), y, |picture, panel| {
         for (key, values) in &curves {
-            picture.begin_stream(key);
-            panel.line(picture, key.class, values, usual_gap(values));
-            picture.end();
+            panel.stream(picture, key, values);
         }
         timeline.dots(picture, panel);
     });
@@ -74,13 +71,11 @@ fn difference(
 fn by_frame(first: &PixelPart, other: &PixelPart, timeline: &Timeline) -> Vec<(f64, f64)> {
     let errors: BTreeMap<(&PointName, Stamp), f64> =
         first.samples.iter().map(|s| ((&s.point, s.timestamp_ns), s.error_px)).collect();
-    let mut sums: BTreeMap<Stamp, (f64, f64)> = BTreeMap::new();
-    for sample in &other.samples {
-        let Some(before) = errors.get(&(&sample.point, sample.timestamp_ns)) else { continue };
-        let sum = sums.entry(sample.timestamp_ns).or_default();
-        *sum = (sum.0 + sample.error_px - before, sum.1 + 1.0);
-    }
-    sums.into_iter().map(|(stamp, (sum, count))| (timeline.seconds(stamp), sum / count)).collect()
+    let change = |s: &Sample| {
+        let before = errors.get(&(&s.point, s.timestamp_ns))?;
+        Some((s.timestamp_ns, s.error_px - before))
+    };
+    timeline.curve(means(other.samples.iter().filter_map(change)))
 }
 
 /// How much longer the other depth is at each key frame that both have, percent.

@@ -20,10 +20,8 @@ pub(crate) fn over_time(
     if part.samples.is_empty() {
         return None;
     }
-    let samples: Vec<(f64, f64)> =
-        part.samples.iter().map(|s| (timeline.seconds(s.timestamp_ns), s.error_px)).collect();
-    let means: Vec<(f64, f64)> =
-        mean_by_frame(part).into_iter().map(|(stamp, error)| (timeline.seconds(stamp), error)).collect();
+    let samples = timeline.curve(part.samples.iter().map(|s| (s.timestamp_ns, s.error_px)));
+    let means = timeline.curve(mean_by_frame(part));
     let frames = trajectory.map(|t| t.frames.as_slice()).unwrap_or_default();
     let panels = if frames.is_empty() { 1 } else { 3 };
     let mut picture = Timeline::picture(panels);
@@ -37,7 +35,7 @@ pub(crate) fn over_time(
     });
     if panels == 3 {
         let errors = |f: fn(&FrameError) -> f64| -> Vec<(f64, f64)> {
-            frames.iter().map(|e| (timeline.seconds(e.timestamp_ns), f(e))).collect()
+            timeline.curve(frames.iter().map(|e| (e.timestamp_ns, f(e))))
         };
         let curves = [
             ("position error, aligned", "m", errors(|e| e.position_m)),
@@ -46,9 +44,7 @@ pub(crate) fn over_time(
         for (index, (title, unit, values)) in (1..).zip(curves) {
             let y = Axis::from_zero(values.iter().map(|v| v.1).chain([0.001]), 4);
             timeline.panel(&mut picture, (index, panels), (title, unit), y, |picture, panel| {
-                picture.begin_stream(key);
-                panel.line(picture, key.class, &values, usual_gap(&values));
-                picture.end();
+                panel.stream(picture, key, &values);
                 timeline.dots(picture, panel);
             });
         }

@@ -5,6 +5,7 @@ use vice_core::statistics::middle;
 use super::MAX_DOTS;
 use super::axis::Axis;
 use super::picture::{Anchor, Picture, Place};
+use crate::report::keys::Key;
 
 /// More places than this on a line add nothing that can be seen.
 const MAX_PLACES: usize = 1600;
@@ -68,6 +69,13 @@ impl Panel {
             }
             picture.line(class, extremes(run, MAX_PLACES).into_iter().map(|v| self.place(v)));
         }
+    }
+
+    /// The line of a stream, which can be switched off, broken where values are missing.
+    pub(crate) fn stream(&self, picture: &mut Picture, key: &Key, values: &[(f64, f64)]) {
+        picture.begin_stream(key);
+        self.line(picture, key.class, values, usual_gap(values));
+        picture.end();
     }
 
     /// Dots, smaller and fainter where there are many; where there are too many, every n-th of them.

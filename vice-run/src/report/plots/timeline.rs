@@ -39,6 +39,11 @@ impl Timeline {
         Self { zero, x, keyframes_s: keyframes.into_iter().map(seconds).collect() }
     }
 
+    /// Values at stamps, as seconds and values.
+    pub(crate) fn curve(&self, values: impl IntoIterator<Item = (Stamp, f64)>) -> Vec<(f64, f64)> {
+        values.into_iter().map(|(stamp, value)| (self.seconds(stamp), value)).collect()
+    }
+
     pub(crate) fn seconds(&self, stamp: Stamp) -> f64 {
         stamp.since(self.zero).as_secs_f64()
     }
